@@ -1,9 +1,7 @@
 """Numbers as people write them, read without guessing."""
 
-import json
 import math
 import re
-from typing import Any
 
 _NUMERAL = r"[+-]?(\d+{sign}?\d*|{sign}\d+)([eE][+-]?\d+)?"
 _NUMERALS = {
@@ -45,19 +43,3 @@ def has_decimals(text: str, decimal: str) -> bool:
 def may_have_thousands(text: str) -> bool:
     """Whether the comma in a number may stand for thousands as well: 1,234."""
     return bool(_MAYBE_THOUSANDS.fullmatch(text.strip()))
-
-
-def load_json(text: str) -> Any:
-    """What a JSON text holds; all its numbers are finite.
-
-    Raises:
-        ValueError: It is not JSON, which knows no NaN, or a number is too large.
-    """
-    return json.loads(text, parse_float=_finite, parse_constant=_finite)
-
-
-def _finite(text: str) -> float:
-    number = float(text)
-    if not math.isfinite(number):
-        raise ValueError(f"{text:.40} is no number in JSON")
-    return number

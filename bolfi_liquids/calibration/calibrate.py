@@ -24,7 +24,7 @@ from ..inputs.start import check_start
 from ..progress import Advance, after_first, progress_bar
 from ..run.compute import Compute, open_compute
 from ..run.given_pours import keep_pours
-from ..run.provenance import LIBRARIES, versions
+from ..run.provenance import versions
 from ..run.recordings import check_names, keep_recordings
 from ..run.run import RUN_TOML, Run
 from ..run.simulations import warn_of_failures
@@ -163,7 +163,7 @@ def run_record(
             **({"baseline": [recording.hash for recording in clean]} if clean else {}),
         },
         "files": {"recordings": [recording.path.name for recording in stirring.recordings]},
-        "versions": versions(LIBRARIES),
+        "versions": versions(),
         # runs may go on with another limit, but it decides which simulations were given up
         **({} if timeout is None else {"timeouts": [float(timeout)]}),
     }

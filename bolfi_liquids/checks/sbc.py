@@ -32,7 +32,7 @@ from ..inputs.settings import (
 )
 from ..progress import progress_bar
 from ..run.compute import HERE, Compute
-from ..run.provenance import LIBRARIES, versions
+from ..run.provenance import versions
 from ..run.run import SIMULATIONS, Run
 from ..seeds import Phase, generator, simulation_seeds
 from .sbc_file import SurrogateCheck, checked, write_results
@@ -103,7 +103,7 @@ def _record(settings: SbcSettings, prior: "Prior", stirring: Stirring) -> Mappin
         | {"prior": describe_prior(prior)},
         "simulator": stirring.settings,
         "inputs": {"sha256": [recording.hash for recording in stirring.recordings]},
-        "versions": versions(LIBRARIES),
+        "versions": versions(),
     }
 
 

@@ -14,13 +14,13 @@ Its groups, under `stirs` and, where pours were given, under `pours`:
 `posterior` holds the draws of the extended model, or of the base model where there is none.
 """
 
+from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..inputs.fields import PLANE_NAMES
-from .effect_status import EffectStatus
 from .findings import Findings
 
 if TYPE_CHECKING:
@@ -31,6 +31,19 @@ if TYPE_CHECKING:
 
 UNITS = {"stirs": {"units": "rad"}, "pours": {"units": "1"}}
 DIMENSIONLESS = {"units": "1"}
+
+
+class EffectStatus(StrEnum):
+    """What became of an effect as an explanation; its spelling is that in criticism.nc."""
+
+    NAMED = "named"
+    POSSIBLE = "possible"
+    LESS_LIKELY = "less likely"
+    REFUTED = "refuted by held-out data"
+    REJECTED = "rejected"
+    NOT_NEEDED = "not needed"
+    NOT_REFITTED = "untested by a refit"
+    FAILED = "untested: its simulations failed"
 
 
 def criticism_tree(findings: Findings) -> "DataTree":

@@ -17,7 +17,7 @@ from ..drawing import (
     styled,
 )
 from ..wording import spoken, unit_of
-from .effect_status import EffectStatus
+from .criticism_file import EffectStatus
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,7 +1,6 @@
 """Versions of the program and its libraries that a run was made with."""
 
 import platform
-from collections.abc import Iterable
 from importlib.metadata import version
 
 LIBRARIES = ("bolfi-liquids", "numpy", "scipy", "jax", "numpyro", "emcee", "taichi", "xarray")
@@ -15,6 +14,6 @@ def generations() -> dict[str, str]:
     return {"engine": ENGINE_VERSION, "model": MODEL_VERSION}
 
 
-def versions(libraries: Iterable[str]) -> dict[str, str]:
-    """Versions of Python and of the named libraries."""
-    return {"python": platform.python_version()} | {name: version(name) for name in libraries}
+def versions() -> dict[str, str]:
+    """Versions of Python, the program and its libraries."""
+    return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}

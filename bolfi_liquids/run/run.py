@@ -144,8 +144,6 @@ class Run:
             InputError: Another command works there; the directory holds a run and `resume` is
                 false; or the run was made with another setting, seed or input.
         """
-        if not resume and (path / RUN_TOML).exists():
-            raise _held(path)
         with alone_in(path):
             run = cls(path, _begin(path, record, resume=resume, growing=growing))
             if resume:
@@ -403,8 +401,9 @@ def _begin(
 ) -> Mapping[str, Any]:
     """run.toml of a run that begins, or goes on; see `Run.begun`."""
     if (path / RUN_TOML).exists():
-        if not resume:  # another command has begun here meanwhile
-            raise _held(path)
+        if not resume:
+            fix = "give `resume` to go on with it, or another `out`"
+            raise InputError("holds a run already", where=str(path), fix=fix)
         held = Run.open(path).record
         differing = _differences(held, record)
         if grows := growing in differing and _larger(*differing[growing]):
@@ -434,12 +433,6 @@ def _write(path: Path, record: Mapping[str, Any]) -> None:
 def _as_read(record: Mapping[str, Any]) -> dict[str, Any]:
     """The record as it will be read: TOML has no tuples."""
     return tomllib.loads(tomli_w.dumps(record))
-
-
-def _held(path: Path) -> InputError:
-    """A refusal to begin where a run is."""
-    fix = "give `resume` to go on with it, or another `out`"
-    return InputError("holds a run already", where=str(path), fix=fix)
 
 
 def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:

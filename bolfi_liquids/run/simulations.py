@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inference.simulations import Keep, jobs, run_missing, stacked, succeeded
+from ..inference.simulations import Keep, jobs, run_missing, succeeded
 from ..inference.simulations.failures import Failure, kind, not_finite
 from ..progress import Advance, Simulate, silent
 
@@ -86,19 +86,3 @@ def warn_of_failures(errors: Sequence[str], timeout: float | None) -> None:
     if others:
         what = "%d of %d simulations failed and are left out; the first: %s"
         logger.warning(what, len(others), len(errors), " ".join(others[0].split()))
-
-
-def keeping(simulate: Simulate, shape: tuple[int, ...], keep: Keep) -> Simulate:
-    """`simulate`, but for what the bank holds; what is simulated is put there.
-
-    Args:
-        simulate: As given to `inference.fit`.
-        shape: Of a signal; a failed run's is NaN.
-        keep: Where simulations are made and kept.
-    """
-
-    def kept(theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
-        results = run_missing(simulate, jobs(theta, seeds), keep, shape)
-        return stacked(results, shape)
-
-    return kept

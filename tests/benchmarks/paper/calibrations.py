@@ -25,9 +25,9 @@ from bolfi_liquids.inputs.prior import describe_prior
 from bolfi_liquids.inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from bolfi_liquids.progress import Simulate
 from bolfi_liquids.run.fluid_simulator import FluidSimulator
-from bolfi_liquids.run.simulations import keeping
 from bolfi_liquids.seeds import generator
 
+from .kept_simulator import keeping
 from .phases import Phase
 from .truths import DENSITY
 

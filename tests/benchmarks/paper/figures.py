@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from bolfi_liquids.run.lock import alone_in
-from bolfi_liquids.run.provenance import LIBRARIES, generations, versions
+from bolfi_liquids.run.provenance import generations, versions
 from bolfi_liquids.run.run import Run
 
 from .figure import Drawn
@@ -54,7 +54,7 @@ def draw_figures(
         Each figure with its name, as soon as it is written.
     """
     chosen = list(dict.fromkeys(names))
-    made_with = {"scale": asdict(scale), **generations(), "versions": versions(LIBRARIES)}
+    made_with = {"scale": asdict(scale), **generations(), "versions": versions()}
     with alone_in(out), Run(out, {}).bank() as bank:
         shared = SharedSimulations(out, scale, bank, executor)
         if "adhesion" in chosen:

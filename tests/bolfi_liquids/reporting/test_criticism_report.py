@@ -10,7 +10,7 @@ from rich.console import Console
 
 from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.cli.tables import print_criticism
-from bolfi_liquids.criticism.effect_status import EffectStatus
+from bolfi_liquids.criticism.criticism_file import EffectStatus
 from bolfi_liquids.criticism.source_summary import PourVerdict, SourceVerdict
 from bolfi_liquids.criticism.summary import SuggestedExperiment
 from bolfi_liquids.reporting import criticism_sentences as sentences
