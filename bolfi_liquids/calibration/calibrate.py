@@ -83,8 +83,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         pours: A table of pours of the liquid that were made, or its path: the posterior does not
             depend on it, but `choose_pour` does.
         cups: With which they were made, or a TOML file of them; None takes the bundled ones.
-        budget: Simulations of the search. Eight more, at draws of the posterior, confirm it;
-            where they do not, eight more follow; and four tell the noise between seeds.
+        budget: Simulations of the search. Eight more check it at draws of the posterior, eight
+            further ones follow if they move it, and four measure the noise between seeds.
         seed: Seed of all random draws.
         surrogate: "signal", which emulates the inclination itself and allows for an error of the
             simulator, or "discrepancy", the paper's, which does not.

@@ -34,7 +34,7 @@ class PosteriorCheck(NamedTuple):
 def check_of(
     fit: "Fit", stirring: Stirring, seed: int, keep: Keep, *, advance: Advance = silent
 ) -> PosteriorCheck:
-    """Simulations at draws of a fit's posterior, which it has seen, and new ones at theta*.
+    """Collect the runs at draws of a posterior, and simulate theta*.
 
     Args:
         fit: Of the engine, with runs that confirm it or not.

@@ -75,7 +75,7 @@ def confirmed(
     settings: CalibrationSettings,
     advance: Advance,
 ) -> "Fit":
-    """The fit to the same simulations, and to some at its draws, beside the simulator's error.
+    """Refit beside the simulator's error, with runs at draws of the posterior.
 
     Args:
         fit: Of the search, beside another error.

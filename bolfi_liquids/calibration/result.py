@@ -1,4 +1,4 @@
-"""What stirring taught: the posterior of a run and what came with it."""
+"""The result of a calibration."""
 
 import json
 from collections.abc import Mapping
@@ -32,7 +32,7 @@ class Calibration:
         run: What it was made from.
         tree: posterior.nc, in ArviZ's schema; groups as in `calibration.posterior_file`.
         summary: The section "calibrate" of summary.json.
-        key: Of the posterior, which tells it from all others.
+        key: Digest of the posterior's draws.
     """
 
     run: Run

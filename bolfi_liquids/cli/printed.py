@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def complaints_among_results() -> Iterator[None]:
-    """What the surrogate's checks complain of is printed with its results, and not before."""
+    """Suppress the surrogate's warnings: they are printed with the results."""
     from ..inference import EmulatorWarning
 
     with warnings.catch_warnings():

@@ -63,8 +63,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
             fitted, and an effect that is named must hold on them.
         baseline: Clean recordings of the same rig, of any liquid, in which no effect is believed
             to be missing: their residuals count as simulator error.
-        pours: A table of pours of the liquid, or its path; a second source. Whatever is found,
-            they count in `choose_pour`.
+        pours: A table of pours of the liquid, or its path; a second source. `choose_pour` uses
+            them in any case.
         held_out_pours: Another, to which nothing is fitted.
         cups: With which they were poured, or a TOML file of them; None takes the bundled ones.
         effects: Names in `models.EFFECTS` to consider; None is all of them.

@@ -28,7 +28,7 @@ class Inputs:
         after: Key of the posterior that is criticised.
         stirring: What the run was calibrated on.
         held_out: Recordings of the same liquid that nothing is fitted to.
-        baseline: Recordings believed to lack nothing; none of those before.
+        baseline: Clean recordings; none of those before.
         left_out: Names of recordings that were given as clean, but are criticised or held out.
         table: Pours of the liquid, if there are any.
         held_out_table: Pours of the liquid that nothing is fitted to, if there are any.

@@ -292,8 +292,7 @@ def _described(
     calibration: Calibration,
     **more: Any,
 ) -> Pour:
-    """With what pour.nc and the section "pour" of summary.json hold, some fields of which are
-    `more`."""
+    """The result from the judged actions; `more` are further fields of its summary."""
     chosen, plug_in = both
     cups, fit_status = learned.cups, calibration.summary.fit_status
     tried = {"actions": choice.over_posterior, "actions_plug_in": choice.at_best}

@@ -65,7 +65,7 @@ def written(
     moving: bool = True,
     chapters: Mapping[str, Any] = MappingProxyType({}),
 ) -> Path:
-    """Write RUN/report.html from what was read or made, as its arguments.
+    """Write RUN/report.html from given results.
 
     Args:
         results: What the run holds.

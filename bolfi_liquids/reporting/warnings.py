@@ -48,7 +48,7 @@ PRIOR_ENDS = {
 
 @dataclass(frozen=True)
 class Results:
-    """What a run holds.
+    """The current results of a run.
 
     Attributes:
         calibration: Without what a criticism accepted.
@@ -99,7 +99,7 @@ def warnings_of(run: Results) -> list[Sentence]:
 
 
 def outdated_sentences(run: Results) -> list[Sentence]:
-    """What does not count any more, and how it is made again."""
+    """Names of stale results, and the command for each."""
     return [
         sentence("warning.outdated", why=why, remedy=remedy)
         for why, remedy in zip(run.outdated, run.remedies, strict=True)

@@ -1,4 +1,4 @@
-"""The pour that a run has chosen, as far as an arm may carry it out."""
+"""The chosen pour, checked for execution."""
 
 import json
 from dataclasses import dataclass

@@ -45,7 +45,7 @@ HERE = Compute()
 def open_compute(
     workers: "Workers | None", timeout: float | None = None, *, progress: bool = True
 ) -> Iterator[Compute]:
-    """What a person gave, checked and opened, before anything is written.
+    """Check and open the workers, before anything is written.
 
     Args:
         workers: Of processes with one thread each: a pool, a Dask client or the address of a Dask

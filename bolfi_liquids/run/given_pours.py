@@ -26,7 +26,7 @@ UNITS = {"angular_velocity": "rad s-1", "distance": "m", **dict.fromkeys(FRACTIO
 
 
 def keep_pours(run: Path, table: PourTable, cups: "Cups") -> None:
-    """Keep pours that were made with these cups, and no others."""
+    """Replace the run's table of pours."""
     from xarray import Dataset, DataTree
 
     values = [table.angular_velocity, table.distance, *table.fractions.T]
@@ -89,6 +89,6 @@ def _held(run: Path) -> "Dataset | None":
 
 
 def _scene(cups: "Cups") -> dict[str, Any]:
-    """What becomes of a pour depends on this, and not on the actions that may be chosen."""
+    """The cups without the ranges of the action."""
     ranges = {"angular_velocity_deg_s", "distance"}
     return json.loads(cups.model_dump_json(exclude={"pour": ranges}))

@@ -18,7 +18,7 @@ MAX_NAME_BYTES = 240  # of a recording: its number, and a few letters while it i
 
 
 def check_names(recordings: tuple[Recording, ...]) -> None:
-    """Refuse recordings of which a run could keep no copy.
+    """Refuse file names that are too long to copy.
 
     Raises:
         InputError: A name is too long.
@@ -70,7 +70,7 @@ def kept_recordings(run: Path, record: Mapping[str, Any]) -> list[Recording]:
 
 
 def kept_paths(run: Path, record: Mapping[str, Any]) -> tuple[Path, ...]:
-    """Of those copies that are there."""
+    """Paths of the existing copies."""
     names = enumerate(record.get("files", {}).get("recordings", ()), start=1)
     paths = [run / RECORDINGS_FOLDER / _name(number, name) for number, name in names]
     return tuple(path for path in paths if path.is_file())

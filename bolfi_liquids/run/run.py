@@ -66,7 +66,7 @@ ABSENT = {
 
 
 class HasRun(Protocol):
-    """A result that knows its RUN directory: a calibration, a criticism or a pour."""
+    """A result with a RUN directory: a calibration, a criticism or a pour."""
 
     @property
     def path(self) -> Path:

@@ -17,7 +17,7 @@ from ..models.runtime import THREADS
 
 @contextmanager
 def processes(count: int | None = None) -> Iterator[Executor | None]:
-    """Processes to work in; None, which is this process, where one is enough.
+    """Start worker processes; yield None, for this process, where one is enough.
 
     They are spawned, since JAX does not survive a fork. The `with` waits for their work; when it
     is left by an error, or by Ctrl-C, what they have not finished is given up.

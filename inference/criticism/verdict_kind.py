@@ -1,4 +1,4 @@
-"""What a criticism may conclude."""
+"""Kinds of verdict."""
 
 from enum import StrEnum
 

@@ -59,10 +59,10 @@ class SimulationBank:
     """Finished simulations by simulator identity, theta and seed, in one SQLite file.
 
     What was simulated depends on no observation, so runs and observations may share a bank,
-    also at the same time: a write is one committed transaction in WAL mode, and who claims a
-    simulation before making it keeps the threads and processes of one machine from making it
-    twice. Claims are locks on the file `<path>-claims`, which stays behind empty. Each row holds a
-    digest of itself; one that is damaged counts as not simulated, and is said in the log.
+    also at the same time: a write is one committed transaction in WAL mode, and a claim keeps the
+    other threads and processes of a machine from simulating the same job. Claims are locks on the
+    file `<path>-claims`, which remains, empty. Each row holds a digest of itself; damaged rows are
+    logged and simulated again.
 
     Args:
         path: File, created if missing; ":memory:" keeps nothing.

@@ -42,7 +42,7 @@ def opened_database(path: object, schema: str, what: str) -> sqlite3.Connection:
         path: File, created if missing; ":memory:" keeps nothing.
         schema: Statements, each ended by ";", that do nothing where they were done before. A
             digest of them is the file's `application_id`: another schema is another kind of file.
-        what: Is kept in the file, for messages.
+        what: Name of the content, for messages.
 
     Raises:
         ValueError: `path` is no path, another file, or cannot be read and written.
