@@ -9,6 +9,7 @@ they are past the receiver's rim, with the source's `angle` [rad] and the share 
 import json
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,7 +20,8 @@ from ..inputs.prior import split_parameters
 from ..inputs.recording import Recording
 from ..progress import Advance, progress_bar
 from ..run.compute import HERE, Compute
-from ..run.run import as_json
+from ..run.result_file import read_result, write_result
+from ..run.run import FRAMES, as_json
 from ..seeds import Phase, simulation_seeds
 from ..wording import unit_of
 from .scenes import FRAME_RATE, Draw, PourScene, PourShown, StirScene
@@ -75,9 +77,10 @@ def frames_of(shown: Shown, compute: Compute = HERE) -> "Dataset":
     theta = calibration.draws(N_DRAWS_SHOWN, seed)
     seeds = simulation_seeds(seed, Phase.MOVING_PICTURES, N_DRAWS_SHOWN)
     made_from = _made_from(theta, seeds, recording, calibration.record["settings"], pour)
-    kept = calibration.run.result("frames")
-    if kept is not None and kept.attrs["made_from"] == as_json(made_from):
-        return kept.to_dataset()
+    path = calibration.path / FRAMES
+    with suppress(OSError, ValueError):  # none is there, or it is damaged
+        if (kept := read_result(path)).attrs["made_from"] == as_json(made_from):
+            return kept.to_dataset()
     scenes = _scenes(calibration, recording, pour, compute.timeout)
     from xarray import DataTree
 
@@ -90,8 +93,8 @@ def frames_of(shown: Shown, compute: Compute = HERE) -> "Dataset":
             f"a moving picture took longer than {compute.timeout:g} s to simulate; allow more "
             "time, or leave the pictures out by --still, in Python by moving=False"
         ) from err
-    dataset = _named(frames, theta)
-    calibration.run.keep("frames", DataTree(dataset), made_from)
+    dataset = _named(frames, theta).assign_attrs(made_from=as_json(made_from))
+    write_result(DataTree(dataset), path)
     return dataset
 
 

@@ -39,16 +39,16 @@ if TYPE_CHECKING:
 
 RUN_TOML = "run.toml"
 SIMULATIONS = "simulations.sqlite"
+FRAMES = "frames.nc"
 REPORT = "report.html"
 RESULTS = {
     "calibrate": "posterior.nc",
     "criticise": "criticism.nc",
     "pour": "pour.nc",
-    "frames": "frames.nc",
 }
 """File of each step's result, in the order of the steps."""
 
-OWN_FILES = (SIMULATIONS, *RESULTS.values(), GIVEN_POURS, RECORDINGS_FOLDER, REPORT)
+OWN_FILES = (SIMULATIONS, *RESULTS.values(), GIVEN_POURS, RECORDINGS_FOLDER, FRAMES, REPORT)
 """What only a run may hold."""
 
 MUST_AGREE = ("settings", "inputs", "simulator", "engine")
@@ -61,7 +61,6 @@ ABSENT = {
     "calibrate": "the calibration in it is not finished",
     "criticise": "the calibration in it was not criticised",
     "pour": "no pour was chosen",
-    "frames": "it has no moving pictures",
 }
 
 
@@ -212,7 +211,7 @@ class Run:
         step: str,
         tree: "DataTree",
         made_from: Mapping[str, Any],
-        summary: Mapping[str, Any] | None = None,
+        summary: Mapping[str, Any],
     ) -> None:
         """Write a result, and summary.json.
 
@@ -222,12 +221,10 @@ class Run:
             made_from: Inputs and settings that decide it, as JSON takes them.
             summary: Its section of summary.json.
         """
-        tree.attrs["made_from"] = as_json(made_from)
-        if summary is not None:
-            tree.attrs["summary"] = json.dumps(summary)
-        write_result(tree, self.path / RESULTS[step])
-        if step == "calibrate":  # of a run that has grown
+        tree.attrs |= {"made_from": as_json(made_from), "summary": json.dumps(summary)}
+        if step == "calibrate":  # of a run that may have grown
             _write(self.path, self.record)
+        write_result(tree, self.path / RESULTS[step])
         self._looked.clear()
         self.write_summary()
 
@@ -235,9 +232,7 @@ class Run:
         """Write summary.json from the current results: it is for people and other programs."""
         trees = [(step, self.result(step)) for step in RESULTS]
         found = {
-            step: json.loads(tree.attrs["summary"])
-            for step, tree in trees
-            if tree is not None and "summary" in tree.attrs
+            step: json.loads(tree.attrs["summary"]) for step, tree in trees if tree is not None
         }
         if found or (self.path / SUMMARY_FILE).exists():
             write_summary(self.path / SUMMARY_FILE, found)
@@ -265,7 +260,7 @@ class Run:
             recordings = kept_paths(self.path, self.record) or ["RECORDING..."]
             words = ("calibrate", *recordings, *clean, "--out", self.path, "--resume")
             return command(*words, *self._options())
-        return command("report" if step == "frames" else step, self.path)
+        return command(step, self.path)
 
     def _look(self, step: str) -> "tuple[DataTree | None, str]":
         """A step's current result, or why there is none; read once."""
@@ -289,8 +284,6 @@ class Run:
         if step == "calibrate":
             same = as_json(made_from) == as_json(self.made_from)
             return "" if same else f"was made by other settings than {RUN_TOML} holds"
-        if step == "frames":  # whoever shows them compares what they were made from
-            return ""
         calibration, why = self._look("calibrate")
         if calibration is None:
             return f"cannot be used: {why}"
