@@ -201,6 +201,8 @@ class Run:
         """
         tree, why = self._look(step)
         if tree is None:
+            if step == "pour" and self.why_not("criticise"):  # which comes first
+                self.required("criticise")
             stale = step != "calibrate" and self.why_not(step)
             more = ", with the options it was made with" if stale else ""
             raise InputError(why, where=str(self.path), fix=f"run{more}: {self.again(step)}")

@@ -336,3 +336,10 @@ def test_an_altered_copy_of_a_recording_is_written_again(run, short_recording, s
     copy.write_bytes(whole[:-1])
     bl.calibrate(short_recording, out=run.path, resume=True, progress=False, **settings)
     assert copy.read_bytes() == whole
+
+
+def test_what_comes_first_is_made_again_first(run):
+    poured(run, run.posterior_key())
+    (run.path / RESULTS["criticise"]).write_bytes(b"cut off")
+    with pytest.raises(InputError, match=r"criticism\.nc is damaged.*bolfi-liquids criticise"):
+        Run.open(run.path).required("pour")
