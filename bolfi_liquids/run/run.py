@@ -236,7 +236,7 @@ class Run:
         found = {
             step: json.loads(tree.attrs["summary"]) for step, tree in trees if tree is not None
         }
-        if found or (self.path / SUMMARY_FILE).exists():
+        if found:  # else numbers of a run that is growing stay until it has others
             write_summary(self.path / SUMMARY_FILE, found)
 
     def __reduce__(self):
@@ -258,7 +258,9 @@ class Run:
     def again(self, step: str) -> str:
         """The command that makes a step's result."""
         if step == "calibrate":
-            clean = ["--baseline", "CLEAN..."] if "baseline" in self.record["inputs"] else []
+            clean = (
+                ["--baseline", "CLEAN..."] if "baseline" in self.record.get("inputs", {}) else []
+            )
             recordings = kept_paths(self.path, self.record) or ["RECORDING..."]
             words = ("calibrate", *recordings, *clean, "--out", self.path, "--resume")
             return command(*words, *self._options())

@@ -18,6 +18,7 @@ from xarray import Dataset, DataTree
 
 import bolfi_liquids as bl
 from bolfi_liquids.errors import InputError
+from bolfi_liquids.reporting.warnings import Results
 from bolfi_liquids.run.lock import LOCK, alone_in
 from bolfi_liquids.run.result_file import read_result, write_result
 from bolfi_liquids.run.run import RESULTS, RUN_TOML, SIMULATIONS, Run, check_resumable
@@ -182,6 +183,7 @@ def test_of_two_commands_that_start_together_exactly_one_enters(tmp_path, count)
 HOLDER = """
 import sys, time
 from pathlib import Path
+from bolfi_liquids.reporting.warnings import Results
 from bolfi_liquids.run.lock import alone_in
 
 with alone_in(Path(sys.argv[1])):
@@ -343,3 +345,21 @@ def test_what_comes_first_is_made_again_first(run):
     (run.path / RESULTS["criticise"]).write_bytes(b"cut off")
     with pytest.raises(InputError, match=r"criticism\.nc is damaged.*bolfi-liquids criticise"):
         Run.open(run.path).required("pour")
+
+
+def test_results_are_those_of_now(run, keep_criticism):
+    assert Results.of(run).criticism is None and run.result("criticise") is None
+    keep_criticism(run.path)  # by another command
+    assert Results.of(run).criticism is not None
+
+
+def test_a_run_that_grows_keeps_its_summary(run, short_recording, settings, monkeypatch):
+    def killed(*_):
+        raise KeyboardInterrupt
+
+    before = (run.path / "summary.json").read_bytes()
+    monkeypatch.setattr("bolfi_liquids.calibration.calibrate._calibrate", killed)
+    with pytest.raises(KeyboardInterrupt):
+        bl.calibrate(short_recording, out=run.path, resume=True, **settings | {"budget": 12})
+    assert (run.path / "summary.json").read_bytes() == before
+    assert Run.open(run.path).result("calibrate") is not None
