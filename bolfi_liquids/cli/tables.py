@@ -31,17 +31,13 @@ def print_calibration(summary: "CalibrationSummary", console: Console) -> None:
         row = [*astuple(values), summary.closest[name]]
         table.add_row(f"{name} {LIQUID_UNITS.get(name, '')}".strip(), *(f"{v:.3g}" for v in row))
     seconds = summary.seconds
-    confirm = {
-        True: ", which confirm the posterior",
-        False: ", which do not confirm the posterior",
-    }
     console.print(table)
     console.print(
         f"closest hypothesis: {summary.fit_rms_deg:.2f} deg RMS from the recording"
         f" (noise alone: {summary.noise_deg:.2f} deg)\n"
         f"{model_error_sentence(summary)}\n"
-        f"simulations: {summary.n_simulations} to search, {summary.n_check_simulations} to check"
-        f"{confirm[summary.confirmed]}\n"
+        f"simulations: {summary.n_simulations} to search, {summary.n_check_simulations} to check,"
+        f" which {'confirm' if summary.confirmed else 'do not confirm'} the posterior\n"
         f"seconds: simulator {seconds.simulator:.1f}, engine {seconds.engine:.1f},"
         f" sampling {seconds.sampling:.1f}",
         highlight=False,

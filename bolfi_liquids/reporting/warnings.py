@@ -70,7 +70,6 @@ class Results:
         Raises:
             InputError: There is no finished calibration.
         """
-        run = Run(run.path, run.record)  # as it is now, whatever was read of it before
         calibration = Calibration.of(run)
         old = {step: why for step in ("criticise", "pour") if (why := run.why_not(step))}
         remedies = tuple(map(run.again, old))

@@ -10,7 +10,7 @@ import sqlite3
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from difflib import get_close_matches
 from functools import cached_property
 from hashlib import sha256
@@ -88,16 +88,15 @@ def run_path(given: RunOrPath) -> Path:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A run as it was when it was opened.
+    """A run, whose results are looked for when they are asked for.
 
     Attributes:
         path: The RUN directory.
-        record: run.toml.
+        record: run.toml, as it was when the run was opened.
     """
 
     path: Path
     record: Mapping[str, Any]
-    _looked: "dict[str, tuple[DataTree | None, str]]" = field(default_factory=dict, repr=False)
 
     @classmethod
     def open(cls, given: RunOrPath) -> "Run":
@@ -227,7 +226,6 @@ class Run:
         if step == "calibrate":  # of a run that may have grown
             _write(self.path, self.record)
         write_result(tree, self.path / RESULTS[step])
-        self._looked.clear()
         self.write_summary()
 
     def write_summary(self) -> None:
@@ -238,10 +236,6 @@ class Run:
         }
         if found:  # else numbers of a run that is growing stay until it has others
             write_summary(self.path / SUMMARY_FILE, found)
-
-    def __reduce__(self):
-        """Without the trees that were read."""
-        return Run, (self.path, self.record)
 
     @property
     def made_from(self) -> dict[str, Any]:
@@ -267,12 +261,7 @@ class Run:
         return command(step, self.path)
 
     def _look(self, step: str) -> "tuple[DataTree | None, str]":
-        """A step's current result, or why there is none; read once."""
-        if step not in self._looked:
-            self._looked[step] = self._read(step)
-        return self._looked[step]
-
-    def _read(self, step: str) -> "tuple[DataTree | None, str]":
+        """A step's current result, or why there is none."""
         path = self.path / RESULTS[step]
         if not path.is_file():
             return None, ABSENT[step]

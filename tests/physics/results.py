@@ -1,4 +1,4 @@
-"""What is left of comparisons: a table, a figure, and a file for the guide's page of accuracy."""
+"""Output of comparisons: a table, a figure, and a file for the guide's page of accuracy."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Rows, results, and what is left of them."""
+"""Rows, results, and their output."""
 
 import json
 import xml.etree.ElementTree as ET

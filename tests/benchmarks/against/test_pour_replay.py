@@ -83,7 +83,7 @@ def test_the_retained_fraction_has_a_bar_where_the_reference_resolves_it(poured,
     assert rows[RETAINED].ours == pytest.approx(more, abs=5e-3)
     (slow, _), rows = judged(poured["filmy_contact_30"], off(retained=more))
     assert RETAINED not in rows
-    assert slow.retained_error == pytest.approx(more, abs=5e-3)  # it is told all the same
+    assert slow.retained_error == pytest.approx(more, abs=5e-3)  # shown, though not judged
 
 
 def test_what_the_reference_does_not_tell_is_not_judged(poured, off):
