@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inference.simulations import Keep, jobs, run_missing, succeeded
+from ..inference.simulations import Compute, jobs, run_missing, succeeded
 from ..inference.simulations.failures import Failure, kind, not_finite
-from ..progress import Advance, Simulate, silent
+from ..progress import Advance, silent
+from ..simulators import FluidSimulator
 
 logger = logging.getLogger(__name__)
 
@@ -31,20 +32,20 @@ class Kept(NamedTuple):
 
 
 def simulate_kept(
-    simulate: Simulate,
+    simulator: FluidSimulator,
     theta: Mapping[str, NDArray],
     seeds: Sequence[int],
-    keep: Keep,
+    compute: Compute,
     *,
     advance: Advance = silent,
 ) -> Kept:
     """Signals for each theta and seed; those found in the bank are not simulated again.
 
     Args:
-        simulate: As given to `inference.fit`.
+        simulator: Of stirs or pours; the bank knows its simulations by its identity.
         theta: Name -> values, shape (n,).
         seeds: n seeds.
-        keep: Where simulations are made and kept.
+        compute: Where simulations are made and kept.
         advance: Called with 1 for each simulation, also for those found in the bank.
 
     Returns:
@@ -54,7 +55,9 @@ def simulate_kept(
         RuntimeError: Every simulation failed.
     """
     asked = jobs(theta, seeds)
-    results = run_missing(simulate, asked, keep, advance=advance)
+    results = run_missing(
+        simulator.simulate, asked, compute, identity=simulator.identity, advance=advance
+    )
     good = succeeded(results)
     errors = [
         "" if place in good else result.error or not_finite("it diverged")
@@ -66,7 +69,7 @@ def simulate_kept(
             f"all {len(seeds)} simulations failed, the first at {asked[0].theta}"
             f" ({errors[0]}); {CURES[failure]}"
         )
-    warn_of_failures(errors, keep.timeout)
+    warn_of_failures(errors, compute.timeout)
     seconds = sum(result.seconds for result in results)
     return Kept(np.stack(list(good.values())), np.array(list(good)), seconds)
 

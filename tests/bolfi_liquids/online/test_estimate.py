@@ -8,7 +8,6 @@ from bolfi_liquids.inference.simulations import Simulation
 
 import bolfi_liquids as bl
 from bolfi_liquids import models
-from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.calibration.summary import BAD_FIT_RATIO
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.prior import default_prior
@@ -32,6 +31,7 @@ from bolfi_liquids.online.plan import (
 from bolfi_liquids.online.record import BAD_FIT, sentence
 from bolfi_liquids.online.settings import OnlineSettings
 from bolfi_liquids.pouring.result import Judged
+from bolfi_liquids.simulators import stir_simulator
 
 ATTRS = {
     "cup_radius": 0.04,
@@ -67,7 +67,7 @@ def signals(theta, seeds, time=PLAN.time):
 
 
 def problem(surrogate="discrepancy", **settings):
-    stirring = stirring_of([PLAN], 200)
+    stirring = stir_simulator([PLAN], 200)
     return Problem(default_prior(), stirring, OnlineSettings(surrogate=surrogate, **settings))
 
 
@@ -112,7 +112,7 @@ def test_missing_samples_equal_a_shorter_recording():
     known, seen = made(of), followed(4)
     samples = int(np.isfinite(seen.observed).all(axis=1).sum())
     short = planned(PLAN.time[:samples], PATH.position[:samples], ATTRS)
-    stirring = stirring_of([short], 200)
+    stirring = stir_simulator([short], 200)
     engine = Bolfi(
         of.prior,
         seen.observed[:samples],
@@ -211,7 +211,7 @@ def test_an_online_estimate_names_a_wrong_frame():
     """A stick that leans ahead of the gripper: the sign of a plane is wrong."""
     recording = bundled_recording("glycerin")
     plan = planned(recording.time, recording.gripper.position, recording.attrs)
-    of = Problem(default_prior(), stirring_of([plan], 200), OnlineSettings(design=8))
+    of = Problem(default_prior(), stir_simulator([plan], 200), OnlineSettings(design=8))
     ends = stroke_ends(plan)
     for sign, faults in ((1.0, 0), (-1.0, 1)):
         seen = recording.inclination * [1.0, sign]

@@ -14,7 +14,14 @@ import pandas as pd
 import pytest
 import xarray as xr
 from bolfi_liquids.inference.arguments import Unusable, checked_integer, float64
-from bolfi_liquids.inference.simulations import Job, Keep, OneByOne, Simulation, jobs, run_missing
+from bolfi_liquids.inference.simulations import (
+    Compute,
+    Job,
+    OneByOne,
+    Simulation,
+    jobs,
+    run_missing,
+)
 from bolfi_liquids.inference.simulations.failures import Failure, kind
 from bolfi_liquids.inference.simulations.job import BATCH
 from dask.array.ma import masked_array as masked_chunks
@@ -194,7 +201,9 @@ def test_a_run_without_a_signal_costs_itself_alone(worker_side, place, single, s
             made = OneByOne(worker_side.One(how, SPOILT_SEED)) if single else None
             simulate = made or worker_side.Many(how, SPOILT_SEED)
             with inference.SimulationBank() as bank:
-                found = run_missing(simulate, JOBS, Keep(bank, "", 4, executor), shape)
+                found = run_missing(
+                    simulate, JOBS, Compute(bank=bank, batch=4, executor=executor), shape
+                )
                 kept = bank.get("", JOBS[2].theta, SPOILT_SEED)
             for job, one in zip(JOBS, found, strict=True):
                 if job.seed != SPOILT_SEED:
@@ -272,7 +281,7 @@ def test_another_simulator_s_signal_in_the_bank_costs_itself_alone():
     with inference.SimulationBank() as bank:
         bank.put("", JOBS[3].theta, JOBS[3].seed, Simulation(np.zeros(9), None, 0.0))
         found = run_missing(
-            lambda theta, seeds: np.zeros((len(seeds), 5)), JOBS, Keep(bank, "", 4), (5,)
+            lambda theta, seeds: np.zeros((len(seeds), 5)), JOBS, Compute(bank=bank, batch=4), (5,)
         )
     assert [one.signal is None for one in found] == [False] * 3 + [True] + [False] * 4
     assert "(9,)" in str(found[3].error)
@@ -289,7 +298,7 @@ def test_a_simulator_of_single_runs_gets_python_s_own_numbers(place):
         return [random.random()]
 
     with place() as executor, inference.SimulationBank() as bank:
-        run_missing(OneByOne(simulate), JOBS, Keep(bank, "", 4, executor), (1,))
+        run_missing(OneByOne(simulate), JOBS, Compute(bank=bank, batch=4, executor=executor), (1,))
     assert got == [int] * len(JOBS)
 
 
