@@ -213,7 +213,7 @@ def _calibrate(run: Run, inputs: CalibrationInputs, compute: "Compute", progress
             clean = _clean_residuals(inputs, compute, advance)
             error = model_error(stirring, fit.best["viscosity"], clean)
         fit = confirmed(fit, error, stirring, compute, settings, advance)
-        warn_of_failures(fit.history.errors.tolist(), compute.timeout)
+        warn_of_failures(fit.history.why.tolist(), compute.timeout)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )

@@ -103,7 +103,7 @@ def confirmed(
         compute,
         settings,
         budget=0,
-        earlier=(theta, search.signals, search.seeds, search.errors.tolist()),
+        earlier=(theta, search.signals, search.seeds, search.why.tolist()),
         confirm=PREDICTIVE_DRAWS,
         progress=advance,
         **beside,

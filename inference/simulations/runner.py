@@ -11,7 +11,7 @@ from ..types import Simulator
 from .bank import Simulation, SimulationBank
 from .compute import Compute
 from .executors import killed_its_worker, workers_of
-from .failures import Failure, NoSignals, kind, raised, unusable
+from .failures import FailureKind, NoSignals, raised, unusable
 from .job import (
     BATCH,
     Job,
@@ -127,12 +127,12 @@ class Runner:
     def _check_first(self, made: Simulation) -> None:
         if not self._misshapen_until:
             return
-        if not is_unusable(made):
+        if made.error is None or not is_unusable(made):
             self._misshapen_until = 0
             return
         self._misshapen += 1
         if self._misshapen == self._misshapen_until:
-            raise NoSignals(str(made.error).removeprefix(unusable("")))
+            raise NoSignals(made.error.text)
 
     def _begin(self) -> None:
         """Take from the bank or simulate whatever nobody else is simulating."""
@@ -288,7 +288,7 @@ def is_final(found: Simulation, timeout: float | None) -> bool:
     """
     if found.error is None:
         return True
-    if kind(found.error) is not Failure.TIMEOUT:
+    if found.error.kind is not FailureKind.TIMEOUT:
         return False
     return timeout is not None and timeout <= found.seconds
 

@@ -5,6 +5,7 @@ import pytest
 from bolfi_liquids.hardware.motion import star
 from bolfi_liquids.inference import Bolfi
 from bolfi_liquids.inference.simulations import Simulation
+from bolfi_liquids.inference.simulations.failures import raised
 
 import bolfi_liquids as bl
 from bolfi_liquids import models
@@ -156,7 +157,7 @@ def test_failed_simulations_are_kept_as_such_and_teach_nothing():
     of = problem()
     known = made(of)
     jobs = proposals(of, known, followed(6).observed, 16, 2)
-    failed = Simulation(None, "it raised", 0.1)
+    failed = Simulation(None, raised(OSError("it raised")), 0.1)
     good = Simulation(signals(TRUTH, [7])[0], None, 0.1)
     more = with_results(known, jobs, [failed, good])
     assert more.size == 18

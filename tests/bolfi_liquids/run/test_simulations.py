@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
 from bolfi_liquids.inference.simulations import Compute
-from bolfi_liquids.inference.simulations.failures import Failure
+from bolfi_liquids.inference.simulations.failures import FailureKind
 
 from bolfi_liquids.run.simulations import (
     CURES,
@@ -65,7 +65,7 @@ def failing(theta, seeds):
 
 @pytest.mark.parametrize(
     ("a", "failure"),
-    [(2.0, Failure.RAISED), (0.5, Failure.NOT_FINITE), (-1.0, Failure.TIMEOUT)],
+    [(2.0, FailureKind.RAISED), (0.5, FailureKind.NOT_FINITE), (-1.0, FailureKind.TIMEOUT)],
 )
 def test_where_all_fail_the_advice_is_of_their_kind(a, failure):
     with SimulationBank() as bank, pytest.raises(RuntimeError) as failed:

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference import simulations
 from bolfi_liquids.inference.simulations import Compute, open_compute, run_missing
+from bolfi_liquids.inference.simulations.failures import raised
 
 from bolfi_liquids import inference
 
+BOOM = raised(OSError("boom"))
 THETA = {"b": 0.1 + 0.2, "a": 1e-3}
 
 
@@ -52,8 +54,8 @@ def test_looks_up_exactly(identity, theta, seed):
 
 def test_keeps_failures_until_a_signal_comes_and_then_that():
     with inference.SimulationBank() as bank:
-        bank.put("id", THETA, 0, simulations.Simulation(None, "boom", 0.0))
-        assert bank.get("id", THETA, 0) == simulations.Simulation(None, "boom", 0.0)
+        bank.put("id", THETA, 0, simulations.Simulation(None, BOOM, 0.0))
+        assert bank.get("id", THETA, 0) == simulations.Simulation(None, BOOM, 0.0)
         for value in (1.0, 2.0):
             bank.put("id", THETA, 0, simulations.Simulation(np.full(2, value), None, 0.0))
         kept = bank.get("id", THETA, 0)
@@ -117,7 +119,7 @@ def test_all_simulations_of_one_identity(tmp_path):
                 bank.put(
                     identity, {"b": 1.0, "a": a}, seed, simulations.Simulation(signal, None, 0.0)
                 )
-            bank.put("id", {"b": 2.0, "a": 0.0}, 7, simulations.Simulation(None, "boom", 0.0))
+            bank.put("id", {"b": 2.0, "a": 0.0}, 7, simulations.Simulation(None, BOOM, 0.0))
             found.append(bank.simulations("id"))
     for kept in found:
         np.testing.assert_array_equal(kept.theta["a"], [0.1, 0.1, 0.3])

@@ -41,7 +41,7 @@ def stuck_at(which, forever, calls=None):
 def test_one_that_takes_too_long_is_given_up(forever):
     started = time.monotonic()
     found = run_batch(stuck_at(2, forever), [JOBS[2]], (1,), 0.1)
-    assert found == [Simulation(None, "timeout: no signal after 0.1 s", 0.1)]
+    assert found == [Simulation(None, timed_out(0.1), 0.1)]
     assert 0.1 <= time.monotonic() - started < 10.0
 
 
@@ -73,7 +73,7 @@ def test_what_the_simulator_raises_is_told_from_a_timeout(error, timeout):
 
     (found,) = run_batch(simulate, JOBS[:1], (1,), timeout)
     assert found.signal is None and found.error is not None
-    assert found.error.startswith(f"{type(error).__name__}: {error} (test_timeout.py, line ")
+    assert found.error.text.startswith(f"{type(error).__name__}: {error} (test_timeout.py, line ")
 
 
 def test_an_error_that_is_no_text_is_kept_all_the_same():
@@ -83,7 +83,7 @@ def test_an_error_that_is_no_text_is_kept_all_the_same():
     with SimulationBank() as bank:
         (found,) = run_missing(simulate, JOBS[:1], Compute(bank=bank), (1,))
         assert bank.get("", *JOBS[0]) == found
-    assert found.error.startswith(r"OSError: cannot read \udcff.dat (")
+    assert found.error.text.startswith(r"OSError: cannot read \udcff.dat (")
 
 
 @pytest.mark.parametrize(("allowed", "again"), [(0.05, False), (0.1, False), (9.0, True)])

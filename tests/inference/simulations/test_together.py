@@ -46,7 +46,7 @@ def test_a_run_that_fails_costs_only_itself():
     with ThreadPoolExecutor(2) as pool:
         found = run(Marching(fails=2), 8, pool)
     assert [one.signal is None for one in found] == [seed == 2 for seed in range(8)]
-    assert "went wrong" in found[2].error
+    assert "went wrong" in found[2].error.text
     assert [one.signal[1] for one in found if one.signal is not None] == [1.0] * 3 + [4.0] * 4
 
 
@@ -83,7 +83,7 @@ def test_a_call_may_take_as_many_times_as_long_as_it_makes_simulations():
         assert calls == [4]
         kept = Compute(bank=bank, executor=pool, timeout=0.05)
         late = run_missing(sleepy, jobs, kept, (1,), identity="short")
-        assert all("no signal after" in one.error for one in late)
+        assert all("no signal after" in one.error.text for one in late)
         assert calls == [4, 4, 1, 1, 1, 1]
 
 
