@@ -125,9 +125,9 @@ def _posterior_of(given: RunOrPath, run: Run) -> Calibration:
         return calibration_to_pour(run)
     if given.key != run.posterior_key():
         raise InputError(
-            "has another posterior since",
+            "holds another posterior: a criticism has added to it, or draws were changed",
             where=str(run.path),
-            fix="open it again, or give the RUN directory",
+            fix="give the RUN directory",
         )
     return given
 

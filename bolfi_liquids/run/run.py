@@ -200,12 +200,18 @@ class Run:
         """
         tree, why = self._look(step)
         if tree is None:
-            if step == "pour" and self.why_not("criticise"):  # which comes first
-                self.required("criticise")
+            for earlier in self._missing_before(step):
+                self.required(earlier)
             stale = step != "calibrate" and self.why_not(step)
             more = ", with the options it was made with" if stale else ""
             raise InputError(why, where=str(self.path), fix=f"run{more}: {self.again(step)}")
         return tree
+
+    def _missing_before(self, step: str) -> list[str]:
+        """Earlier steps that must be made again first: a run may do without a criticism."""
+        earlier = list(RESULTS)[: list(RESULTS).index(step)]
+        needed = [one for one in earlier if one == "calibrate" or self.why_not(one)]
+        return [one for one in needed if self.result(one) is None]
 
     def keep(
         self,
