@@ -4,10 +4,10 @@
 
 A kill is of `calibrate`, `criticise`, `pour` or `check sbc` on a small run, or of
 `record --emulator`, by SIGKILL, SIGTERM or SIGINT; a full disk is a limit on the size of files
-(EFBIG), which needs no right to mount one. The command is then repeated (`calibrate` with --resume),
-and what it has concluded compared with a run that nobody disturbed: numbers, simulations, and when
-those were made that the stopped one had. A recording cannot be repeated: its processes must end,
-and another one must succeed.
+(EFBIG), which needs no right to mount one. The command is then repeated (`calibrate` with
+--resume), and what it has concluded compared with a run that nobody disturbed: numbers,
+simulations, and when those were made that the stopped one had. A recording cannot be repeated:
+its processes must end, and another one must succeed.
 """
 
 import argparse

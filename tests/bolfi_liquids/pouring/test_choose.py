@@ -131,10 +131,11 @@ def test_an_effect_that_does_not_act_in_pours_needs_no_new_ones(
     more = {**pour_settings, "force": True, "progress": False}
     bl.choose_pour(run, **more)
     before = len(made_up.calls)
-    settings = PourSettings(**pour_settings)
-    decided(extended(run, "camera_tilt"), bundled_cups(), settings, Compute())
+    cups = pour_settings["cups"]
+    settings = PourSettings(**{k: v for k, v in pour_settings.items() if k != "cups"})
+    decided(extended(run, "camera_tilt"), cups, settings, Compute())
     assert len(made_up.calls) == before
-    tree = decided(extended(run, "adhesion"), bundled_cups(), settings, Compute()).tree
+    tree = decided(extended(run, "adhesion"), cups, settings, Compute()).tree
     count = pour_settings["budget"]
     assert sum(made_up.calls) == 2 * count
     assert (tree["pours"]["adhesion"] == 0.0).sum() == count < tree["pours"].sizes["pour"]
