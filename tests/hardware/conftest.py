@@ -1,4 +1,4 @@
-"""The motion loop, its driver and the emulator in this thread, on a clock that the test steps."""
+"""The motion loop, its driver and a controller in this thread, on a clock that the test steps."""
 
 import sys
 from collections.abc import Callable
@@ -8,7 +8,6 @@ from queue import Queue
 import numpy as np
 import pytest
 from bolfi_liquids.hardware.board import SPAWN, Board, Row, Who
-from bolfi_liquids.hardware.emulator.controller import Options
 from bolfi_liquids.hardware.motion.cup_frame import cup_frame
 from bolfi_liquids.hardware.motion.kinematics import inverse
 from bolfi_liquids.hardware.recorder.events import EventLog, read_events
@@ -29,7 +28,8 @@ from bolfi_liquids.hardware.safety.limits import Tool, workspace
 
 sys.path.insert(0, str(Path(__file__).parent))
 from stepped_clock import SteppedClock  # noqa: E402
-from stepped_emulator import SteppedEmulator, library  # noqa: E402
+from ur_controller.controller import Options  # noqa: E402
+from ur_controller.stepped import SteppedController, library  # noqa: E402
 
 LONGEST = 120.0  # s of the stepped clock, after which a test has failed
 
@@ -82,7 +82,7 @@ class SteppedControl:
         moved: Host times of ticks in which the arm moved [s].
     """
 
-    def __init__(self, to: Assignment, emulator: SteppedEmulator):
+    def __init__(self, to: Assignment, emulator: SteppedController):
         self.emulator, self.clock = emulator, emulator.clock
         self.directory = Path(to.directory)
         self.reports: list[Report] = []
@@ -168,11 +168,11 @@ class SteppedControl:
 
 @pytest.fixture
 def step_emulator(monkeypatch):
-    """Makes a `SteppedEmulator`, and ur_rtde's modules are its clients."""
-    running: list[SteppedEmulator] = []
+    """Makes a `SteppedController`, and ur_rtde's modules are its clients."""
+    running: list[SteppedController] = []
 
     def make(clock: SteppedClock, **options):
-        running.append(emulator := SteppedEmulator(Options(**options), clock))
+        running.append(emulator := SteppedController(Options(**options), clock))
         for module in ("rtde_receive", "rtde_control"):
             monkeypatch.setitem(sys.modules, module, library(emulator))
         return emulator
@@ -183,9 +183,14 @@ def step_emulator(monkeypatch):
 
 
 @pytest.fixture
-def stepped(tmp_path, monkeypatch, step_emulator):
-    """Makes a `SteppedControl` of a rig, a tool, and where that starts in the cup's frame."""
+def at_once(monkeypatch):
+    """The driver's thread does its work when it is started."""
     monkeypatch.setattr(ur, "Thread", AtOnce)
+
+
+@pytest.fixture
+def stepped(tmp_path, monkeypatch, step_emulator, at_once):
+    """Makes a `SteppedControl` of a rig, a tool, and where that starts in the cup's frame."""
     # the process of the tests keeps its priority
     monkeypatch.setattr(control_loop, "quieten", lambda: None)
     monkeypatch.setattr(control_loop, "hurry", lambda: "normal")
@@ -198,7 +203,9 @@ def stepped(tmp_path, monkeypatch, step_emulator):
         joints = inverse(space.arm, base, space.start, tcp=space.tcp).joints
         emulator = step_emulator(SteppedClock(), joints=tuple(joints.tolist()), seed=1)
         probes = base[None] if armed else np.empty((0, 6))
-        to = Assignment(rig, emulator.address, tool, armed, str(tmp_path), probes, cameras)
+        to = Assignment(
+            rig, ur.URController(emulator.address), tool, armed, str(tmp_path), probes, cameras
+        )
         running.append(SteppedControl(to, emulator))
         return running[-1]
 
