@@ -66,7 +66,7 @@ class Robot(RigSection, frozen=True):
     Attributes:
         driver: Which driver moves it.
         host: Address of its controller.
-        controller: Its generation; the emulator follows it.
+        controller: Its generation.
         rate: Of the motion loop [Hz].
         payload: Of gripper and stick [kg].
         payload_centre: In the flange's frame [m].

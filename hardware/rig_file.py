@@ -37,7 +37,7 @@ def open_rig(path: str | Path) -> Rig:
 
 
 def bundled_rig() -> Rig:
-    """The rig that comes with the package; its robot is the emulator."""
+    """The rig that comes with the package; no robot answers at its address."""
     with as_file(files(f"{__package__}.data") / BUNDLED) as path:
         return open_rig(path)
 

@@ -37,7 +37,7 @@ class ArmOptions:
         bool, typer.Option("--arm", help="Move the arm, once a typed sentence allows it.")
     ] = False
     emulator: Annotated[
-        bool, typer.Option("--emulator", help="All of it with an emulator and rendered cameras.")
+        bool, typer.Option("--emulator", help="All of it with an emulated arm and cameras.")
     ] = False
     viscosity: Annotated[
         float | None, typer.Option(help="Of the emulated liquid [Pa s]; else 1.")

@@ -89,22 +89,3 @@ def calibrate_cameras(
     given = Pictures(pictures.square / 100, pictures.boards, pictures.plumb_line)
     for line in calibrate_view(rig, view, given, out=pictures.out):
         typer.echo(line)
-
-
-@app.command(epilog=examples("rig emulate --viscosity 1"))
-def emulate(
-    rig: RigOption = None,
-    address: Annotated[
-        str | None, typer.Option(metavar="127.x.y.z", help="Where it listens; else a free one.")
-    ] = None,
-    viscosity: Annotated[float, typer.Option(help="Of the liquid in the cup [Pa s].")] = 1.0,
-) -> None:
-    """Emulate the robot's controller until Ctrl-C.
-
-    Any client of a real controller may connect to it, ours by `host` under `robot` in rig.toml.
-    """
-    from ..inputs.rigs import rig_of
-    from ..robot.lone_emulator import emulator_until_interrupted
-
-    for line in emulator_until_interrupted(rig_of(rig), address, viscosity):
-        typer.echo(line)

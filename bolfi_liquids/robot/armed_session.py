@@ -1,7 +1,7 @@
 """A session that may move an arm: a person has agreed, or the arm is emulated."""
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -39,11 +39,11 @@ class EmulatedRobot(NamedTuple):
     """What to use in place of a robot.
 
     Attributes:
-        start: Runs the emulator while it is entered.
+        rig: The arm and its cameras.
         source: Where the data come from, for the recording.
     """
 
-    start: "AbstractContextManager[EmulatedRig]"
+    rig: "EmulatedRig"
     source: str
 
 
@@ -77,7 +77,7 @@ def check_consent(ask: Ask | None, emulate: object, where: str) -> None:
 def armed_session(
     task: Task, *, ask: Ask | None = None, emulation: EmulatedRobot | None = None
 ) -> "Iterator[Session]":
-    """Ask a person, or start an emulator; then a session that may move the arm.
+    """Ask a person, unless the arm is emulated; then a session that may move the arm.
 
     Args:
         task: What will be done.
@@ -88,35 +88,31 @@ def armed_session(
         InputError: Both are given, or neither.
         RigError: The person did not agree, or something cannot be used.
     """
-    from ..hardware import Session, SessionSetup, confirm, confirm_emulated, webcams
+    from ..hardware import Session, SessionSetup, confirm, webcams
     from ..hardware.session.confirmation import describe
 
     check_consent(ask, emulation, "armed_session")
-    text = f"{task.about}\n{describe(task.paths, task.rig, task.tool)}".lstrip()
-    with ExitStack() as stack:
-        if emulation is not None:
-            running = stack.enter_context(emulation.start)
-            address, source = running.emulator.address, emulation.source
-            make_cameras = running.make_cameras
-            confirmation = confirm_emulated(text, address)
-        else:
-            assert ask is not None
-            address, source = task.rig.robot.host, "robot"
-            make_cameras = webcams(task.rig)
-            confirmation = confirm(text, ask(text), address)
-        setup = SessionSetup(
-            task.rig,
-            task.out,
-            address,
-            make_cameras if task.cameras else {},
-            tool=task.tool,
-            armed=True,
-            confirmation=confirmation,
-            plan=task.paths,
-            rehearsal=emulation is not None,
-            source=source,
-        )
-        yield stack.enter_context(_discarded_unless_moved(Session(setup)))
+    if emulation is not None:
+        arm, make_cameras = emulation.rig
+        confirmation, source = None, emulation.source
+    else:
+        assert ask is not None
+        text = f"{task.about}\n{describe(task.paths, task.rig, task.tool)}".lstrip()
+        arm, make_cameras, source = None, webcams(task.rig), "robot"
+        confirmation = confirm(text, ask(text), task.rig.robot.host)
+    setup = SessionSetup(
+        task.rig,
+        task.out,
+        arm,
+        make_cameras if task.cameras else {},
+        tool=task.tool,
+        armed=True,
+        confirmation=confirmation,
+        plan=task.paths,
+        source=source,
+    )
+    with _discarded_unless_moved(Session(setup)) as session:
+        yield session
 
 
 @contextmanager

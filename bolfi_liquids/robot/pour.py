@@ -1,4 +1,4 @@
-"""The chosen pour carried out: by the robot, or by the emulator."""
+"""The chosen pour carried out: by the robot, or by an emulated arm."""
 
 import logging
 from pathlib import Path
@@ -104,7 +104,7 @@ def execute_pour(
         run: A RUN directory, or a calibration, criticism or pour of it.
         rig: Where source and receiver are, or its file; None is the bundled one.
         ask: Shows a person the plan, returns what the person typed.
-        emulate: Use an emulator instead, as in `record`; a pour shows nothing of the liquid.
+        emulate: Use an emulated arm instead, as in `record`; a pour shows nothing of the liquid.
         despite_bad_fit: Whether a real arm may carry out what was chosen over a bad fit, by force.
         progress: Whether to show a live view on stderr.
 
@@ -137,7 +137,7 @@ def execute_pour(
 def _carried_out(
     plan: PourMotion, rig: "Rig", ask: Ask | None, emulate: object, progress: bool
 ) -> Path:
-    """The directory of what an arm, or its emulator, did."""
+    """The directory of what an arm did, or an emulated one."""
     from ..hardware import SessionInterrupted, emulated
     from ..hardware.motion import approach_pour
 
@@ -145,8 +145,8 @@ def _carried_out(
     task = Task(rig, "pouring", [plan.path], out, about=str(plan.chosen))
     emulation = None
     if emulate:
-        start = emulated(rig, plan.ready, tool="pouring")
-        emulation = EmulatedRobot(start, source="emulated UR arm")
+        pouring = emulated(rig, plan.ready, tool="pouring")
+        emulation = EmulatedRobot(pouring, source="emulated UR arm")
     try:
         with (
             armed_session(task, ask=ask, emulation=emulation) as session,

@@ -38,8 +38,8 @@ def record(
         rig: What is there, or its file; None is the bundled one.
         out: Directory of the recording; new or empty.
         ask: Shows a person the plan, returns what the person typed.
-        emulate: Use an emulator and rendered cameras, which look at this liquid; True takes one
-            of 1 Pa s.
+        emulate: Use an emulated arm and rendered cameras, which look at this liquid; True takes
+            one of 1 Pa s.
         cycles: How often the pattern is repeated; None as in the rig's file.
         progress: Whether to show a live view on stderr, if that is a terminal.
 

@@ -1,4 +1,4 @@
-"""A stir carried out: by the robot, or by the emulator with rendered cameras."""
+"""A stir carried out: by the robot, or by an emulated arm with rendered cameras."""
 
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -91,8 +91,8 @@ def stir_session(
         plan: That will be followed.
         out: Directory of the recording; new or empty.
         ask: Shows the plan; what it returns must be the sentence that the plan asks for.
-        emulate: Start an emulator and rendered cameras instead; nobody is asked. Its `stir` is that
-            of the plan.
+        emulate: Use an emulated arm and rendered cameras instead; nobody is asked. Its `stir` is
+            that of the plan.
 
     Raises:
         InputError: `ask` and `emulate` are both given, or neither is; or a camera is a file.

@@ -119,7 +119,7 @@ class Session:
         start_directory(self.directory, rig, extra, duration=setup.duration, videos=videos)
         log = EventLog(self.directory, "main")
         plan = "" if setup.confirmation is None else setup.confirmation.plan
-        log.write("session", armed=setup.armed, address=setup.controller, plan=plan)
+        log.write("session", armed=setup.armed, address=setup.controller.address, plan=plan)
         return log
 
     def preflight(self) -> list[Check]:

@@ -30,7 +30,7 @@ def changed(tmp_path):
 def test_the_bundled_rig_can_be_used():
     rig = bundled_rig()
     assert (rig.camera("xz").view, rig.camera("yz").view) == ("xz", "yz")
-    assert rig.robot.host.startswith("127.")  # nothing but the emulator answers there
+    assert rig.robot.host.startswith("127.")  # no robot answers there
     volume = np.pi * rig.stick.radius**2 * rig.stick.length
     assert rig.stick.density == pytest.approx(rig.stick.mass / volume)
     assert (rig.limits.stirring.low < rig.limits.stirring.high).all()

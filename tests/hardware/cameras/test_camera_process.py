@@ -23,14 +23,15 @@ from bolfi_liquids.hardware.recorder.stamps import MAX_BAD_STAMPS  # noqa: E402
 from bolfi_liquids.hardware.recorder.video import VideoWriter  # noqa: E402
 from bolfi_liquids.hardware.recorder.views import camera_model, stick_view  # noqa: E402
 from bolfi_liquids.hardware.rendering.drawing import prepare, render  # noqa: E402
-from bolfi_liquids.hardware.rendering.scene import CLEAN, Look, Scene  # noqa: E402
-from bolfi_liquids.hardware.rendering.world import MovingWorld, WorldState  # noqa: E402
+from bolfi_liquids.hardware.rendering.scene import Look, Scene  # noqa: E402
+from bolfi_liquids.hardware.rendering.world import WorldState  # noqa: E402
 from bolfi_liquids.hardware.rig_file import bundled_rig  # noqa: E402
 from bolfi_liquids.hardware.session.camera_process import _Tally as Tally  # noqa: E402
 from bolfi_liquids.hardware.session.camera_process import run_camera, tallied  # noqa: E402
 from bolfi_liquids.hardware.vision.frame import Frame  # noqa: E402
 from bolfi_liquids.hardware.vision.frame_measurement import FrameMeasurement  # noqa: E402
 from bolfi_liquids.hardware.vision.measuring import FrameMeter  # noqa: E402
+from rendered_scenes import CLEAN, MovingWorld  # noqa: E402
 
 # pictures come at 30 Hz, and none may be missed; the others keep no time
 keeps_time = pytest.mark.punctual

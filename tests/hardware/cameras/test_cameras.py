@@ -15,14 +15,8 @@ from bolfi_liquids.hardware.cameras import (
     WebcamSettings,
 )
 from bolfi_liquids.hardware.cameras.base import grey
-from bolfi_liquids.hardware.rendering import (
-    CLEAN,
-    Look,
-    MovingWorld,
-    prepare,
-    rehearsal_camera,
-    rehearsal_scene,
-)
+from bolfi_liquids.hardware.rendering import Look, prepare
+from rendered_scenes import CLEAN, MovingWorld, rehearsal_camera, rehearsal_scene
 
 cv2 = pytest.importorskip("cv2")
 

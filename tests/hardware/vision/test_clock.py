@@ -6,14 +6,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.cameras import RenderedCamera, Timing
 from bolfi_liquids.hardware.motion import Trajectory, star
-from bolfi_liquids.hardware.rendering import (
-    Look,
-    MovingWorld,
-    prepare,
-    rehearsal_camera,
-    rehearsal_scene,
-    stick_view,
-)
+from bolfi_liquids.hardware.rendering import Look, prepare
 from bolfi_liquids.hardware.vision import (
     Clock,
     ClockError,
@@ -27,6 +20,7 @@ from bolfi_liquids.hardware.vision import (
     join,
     refine_orientation,
 )
+from rendered_scenes import MovingWorld, rehearsal_camera, rehearsal_scene, stick_view
 from scipy.interpolate import CubicSpline
 
 cv2 = pytest.importorskip("cv2")

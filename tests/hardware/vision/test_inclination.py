@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 from bolfi_liquids.hardware.rendering import direction as down_direction
-from bolfi_liquids.hardware.rendering import rehearsal_camera
 from bolfi_liquids.hardware.vision import (
     Clock,
     Flag,
@@ -19,6 +18,7 @@ from bolfi_liquids.hardware.vision import (
     join,
     look_at,
 )
+from rendered_scenes import rehearsal_camera
 
 ERROR = 2e-4
 

@@ -6,16 +6,12 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.rendering import (
     BRIGHT_STICK,
-    CLEAN,
     Look,
     WorldState,
     direction,
     fault_of,
     prepare,
-    rehearsal_camera,
-    rehearsal_scene,
     render,
-    stick_view,
 )
 from bolfi_liquids.hardware.vision import (
     CameraModel,
@@ -29,6 +25,7 @@ from bolfi_liquids.hardware.vision import (
     marker_is_good,
     measure,
 )
+from rendered_scenes import CLEAN, rehearsal_camera, rehearsal_scene, stick_view
 
 cv2 = pytest.importorskip("cv2")
 
