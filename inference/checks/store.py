@@ -68,7 +68,7 @@ class ReplicateStore:
             "SELECT number, arrays, effective, seconds, stage, failure, error FROM replicate "
             "ORDER BY number"
         )
-        return {row[0]: _from_row(*row) for row in rows}
+        return {row[0]: _from_row(row) for row in rows}
 
     def put(self, replicate: Replicate) -> None:
         """Keep a replicate; a finished one is never replaced, a failed one is."""
@@ -101,15 +101,9 @@ class ReplicateStore:
         self.close()
 
 
-def _from_row(  # noqa: PLR0913  a row's columns
-    number: int,
-    arrays: bytes,
-    effective: float | None,
-    seconds: float,
-    stage: str | None,
-    kind: str | None,
-    text: str,
-) -> Replicate:
+def _from_row(row: tuple) -> Replicate:
+    """The replicate of a row's columns, in the order of `load`."""
+    number, arrays, effective, seconds, stage, kind, text = row
     with np.load(io.BytesIO(arrays), allow_pickle=False) as file:
         held = dict(file)
     held.setdefault("log_density", None)
