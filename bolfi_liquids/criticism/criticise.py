@@ -2,7 +2,7 @@
 
 import logging
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,6 +49,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     effects: str | Sequence[str] | None = None,
     accept: str | Sequence[str] | None = None,
     seed: int = 0,
+    batch: int = CriticismSettings.batch,
     executor: "Workers | None" = None,
     timeout: float | None = None,
     progress: bool = True,
@@ -71,6 +72,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         effects: Names in `models.EFFECTS` to consider; None is all of them.
         accept: Effects that join the model whatever the verdict.
         seed: Seed of all random draws.
+        batch: Simulations in one call, where there is no executor.
         executor, timeout: See `calibrate`.
         progress: Whether to show phases on stderr.
 
@@ -82,9 +84,10 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     """
     started = time.perf_counter()
     settings = CriticismSettings(
-        effects=_names("effects", effects),
-        accept=_names("accept", accept),
+        effects=effects,
+        accept=accept,
         seed=seed,
+        batch=batch,
     )
     check_effects(settings)
     given = ComparedData(
@@ -112,24 +115,6 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         summary = CriticismSummary.from_findings(findings, tree, time.perf_counter() - started)
         run.keep("criticise", tree, inputs.made_from, summary.to_json())
         return Criticism.made(base, tree)
-
-
-def _names(argument: str, given: str | Sequence[str] | None) -> tuple[str, ...] | None:
-    """One name or several.
-
-    Raises:
-        InputError: Something else was given.
-    """
-    if given is None:
-        return None
-    several = isinstance(given, Iterable) and not isinstance(given, str)
-    listed = list(given) if several else [given]
-    names = tuple(one for one in listed if isinstance(one, str))
-    if len(names) < len(listed):
-        raise InputError(
-            f"{given!r:.80}", where=Argument(argument), fix="give names of effects, or none"
-        )
-    return names
 
 
 def _find(

@@ -54,9 +54,6 @@ OWN_FILES = (SIMULATIONS, *RESULTS.values(), GIVEN_POURS, RECORDINGS_FOLDER, FRA
 MUST_AGREE = ("settings", "inputs", "simulator", "engine")
 """Sections of run.toml that decide the results; dates, names and libraries may differ."""
 
-RESUMED_OPTIONS = ("budget", "surrogate", "sampler", "seed", "particles", "batch")
-"""Of the command `calibrate`."""
-
 ABSENT = {
     "calibrate": "the calibration in it is not finished",
     "criticise": "the calibration in it was not criticised",
@@ -302,7 +299,7 @@ class Run:
     def _options(self) -> list[str]:
         """Options with which the run was started, where they are not the default."""
         settings, usual = self.record.get("settings", {}), asdict(CalibrationSettings())
-        given = {name: settings.get(name, usual[name]) for name in RESUMED_OPTIONS}
+        given = {name: settings.get(name, default) for name, default in usual.items()}
         changed = {name: value for name, value in given.items() if value != usual[name]}
         return [word for name, value in changed.items() for word in (f"--{name}", str(value))]
 
