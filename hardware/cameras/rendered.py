@@ -1,14 +1,13 @@
 """A camera that renders what a world shows, in real time and with a clock of its own."""
 
 import csv
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 import numpy as np
 
+from ..host_clock import REAL_CLOCK, HostClock
 from ..rendering.drawing import Stage, exposure_times, render
 from ..rendering.faults import fault_of
 from ..rendering.world import World, WorldState
@@ -51,8 +50,7 @@ class RenderedCamera:
         timing: Timing | None = None,
         *,
         truth: Path | None = None,
-        now: Callable[[], float] = time.monotonic,
-        sleep: Callable[[float], None] = time.sleep,
+        clock: HostClock = REAL_CLOCK,
     ) -> None:
         """Start the camera's clock.
 
@@ -61,13 +59,12 @@ class RenderedCamera:
             world: Where the gripper and the stick are.
             timing: Of the frames; by default that of a webcam at 30 frames per second.
             truth: A CSV file to write what every frame truly showed.
-            now: This computer's clock [s].
-            sleep: Waits so many seconds.
+            clock: This computer's.
         """
         self._stage, self._world = stage, world
         self._timing = Timing() if timing is None else timing
-        self._now, self._sleep = now, sleep
-        self._start = now()
+        self._clock = clock
+        self._start = clock.now()
         self._next = 0
         self._rng = np.random.default_rng(self._timing.seed)
         self._file: IO[str] | None = None if truth is None else truth.open("w", newline="")
@@ -78,9 +75,7 @@ class RenderedCamera:
         """The next frame; waits until it would have arrived."""
         index = self._skip_missed()
         exposed = self._exposed(index)
-        wait = exposed + self._timing.latency - self._now()
-        if wait > 0:
-            self._sleep(wait)
+        self._clock.sleep(exposed + self._timing.latency - self._clock.now())
         self._next = index + 1
         stage = self._stage
         moments = exposure_times(exposed, stage.look)
@@ -89,7 +84,7 @@ class RenderedCamera:
         image = render(stage, states, self._rng, fault)
         stamp = self._stamp(exposed)
         self._write_truth(index, stamp, states[len(states) // 2])
-        return Frame(index, stamp, max(self._now(), exposed + self._timing.latency), image)
+        return Frame(index, stamp, max(self._clock.now(), exposed + self._timing.latency), image)
 
     def close(self) -> None:
         """Close the file of truths."""
@@ -99,7 +94,7 @@ class RenderedCamera:
 
     def _skip_missed(self) -> int:
         """Index of the oldest frame that is not too late."""
-        behind = self._now() - self._exposed(self._next) - self._timing.latency
+        behind = self._clock.now() - self._exposed(self._next) - self._timing.latency
         if behind <= MAX_LATENESS:
             return self._next
         return self._next + int(np.ceil((behind - MAX_LATENESS) * self._rate))

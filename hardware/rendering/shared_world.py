@@ -38,9 +38,12 @@ class SharedWorld:
 
     def state(self, host: float) -> WorldState:
         """The scene at a host time [s], between the two states around it; the last one stays."""
-        end = self._written.value
-        rows = np.frombuffer(self._memory).reshape(ROWS, WIDTH).copy()
-        first = max(self._written.value - ROWS + 1, 0)
+        while True:
+            end = self._written.value
+            rows = np.frombuffer(self._memory).reshape(ROWS, WIDTH).copy()
+            first = max(self._written.value - ROWS + 1, 0)
+            if first < end:  # always, unless this process stood still for seconds in between
+                break
         times, *columns = rows[np.arange(first, end) % ROWS].T
         time, *place = (float(np.interp(host, times, column)) for column in columns)
         return WorldState(time, np.array(place[:3]), np.array(place[3:]))

@@ -7,7 +7,7 @@ from queue import Queue
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware.arm import Controller, Tool
+from bolfi_liquids.hardware.arm import Tool
 from bolfi_liquids.hardware.board import SPAWN, Board, Row, Who
 from bolfi_liquids.hardware.motion.cup_frame import cup_frame
 from bolfi_liquids.hardware.motion.kinematics import inverse
@@ -190,25 +190,16 @@ def at_once(monkeypatch):
 
 
 @pytest.fixture
-def stepped_loop(tmp_path, monkeypatch):
-    """Makes a `SteppedControl` of a rig, a tool, what opens its arm, and the clock of both."""
+def stepped_loop(monkeypatch):
+    """Makes a `SteppedControl` of an assignment, whose arm goes by the same clock."""
     # the process of the tests keeps its priority
     monkeypatch.setattr(control_loop, "quieten", lambda: None)
     monkeypatch.setattr(control_loop, "hurry", lambda: "normal")
     monkeypatch.setattr(order_queue, "hurry", lambda: "normal")
     running: list[SteppedControl] = []
 
-    def make(rig: Rig, tool: Tool, arm: Controller, clock: SteppedClock, **more):
-        to = Assignment(
-            rig,
-            arm,
-            tool,
-            more.get("armed", True),
-            str(tmp_path),
-            more.get("probes", np.empty((0, 6))),
-            more.get("cameras", False),
-        )
-        running.append(SteppedControl(to, clock, more.get("emulator")))
+    def make(to: Assignment, clock: SteppedClock, emulator: SteppedController | None = None):
+        running.append(SteppedControl(to, clock, emulator))
         return running[-1]
 
     yield make
@@ -217,7 +208,7 @@ def stepped_loop(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def stepped(stepped_loop, step_emulator, at_once):
+def stepped(tmp_path, stepped_loop, step_emulator, at_once):
     """Makes a `SteppedControl` of a rig, a tool, and where that starts in the cup's frame."""
 
     def make(rig: Rig, tool: Tool, start, *, armed: bool = True, cameras: bool = False):
@@ -225,8 +216,9 @@ def stepped(stepped_loop, step_emulator, at_once):
         base = cup_frame(rig.cup).to_base(start)
         joints = inverse(space.arm, base, space.start, tcp=space.tcp).joints
         emulator = step_emulator(clock, joints=tuple(joints.tolist()), seed=1)
+        controller = ur.URController(emulator.address)
         probes = base[None] if armed else np.empty((0, 6))
-        more = {"armed": armed, "probes": probes, "cameras": cameras, "emulator": emulator}
-        return stepped_loop(rig, tool, ur.URController(emulator.address), clock, **more)
+        to = Assignment(rig, controller, tool, armed, str(tmp_path), probes, cameras)
+        return stepped_loop(to, clock, emulator)
 
     return make

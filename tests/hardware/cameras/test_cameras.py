@@ -17,6 +17,7 @@ from bolfi_liquids.hardware.cameras import (
 from bolfi_liquids.hardware.cameras.base import grey
 from bolfi_liquids.hardware.rendering import Look, prepare
 from rendered_scenes import CLEAN, MovingWorld, rehearsal_camera, rehearsal_scene
+from stepped_clock import SteppedClock
 
 cv2 = pytest.importorskip("cv2")
 
@@ -192,19 +193,6 @@ def test_a_driver_s_stamps_are_used_if_they_advance_on_this_computer_s_clock(
     assert [frame.stamp for frame in frames] == pytest.approx(told, abs=1e-9)
 
 
-class Clock:
-    """A computer's clock that only waiting moves."""
-
-    def __init__(self) -> None:
-        self.time = 50.0
-
-    def now(self) -> float:
-        return self.time
-
-    def sleep(self, duration: float) -> None:
-        self.time += duration
-
-
 class Asked:
     """A world that notes when it was asked."""
 
@@ -219,14 +207,14 @@ class Asked:
         return self._world.state(host)
 
 
-def rendered(timing: Timing, clock: Clock, world, **kwargs) -> RenderedCamera:
+def rendered(timing: Timing, clock: SteppedClock, world, **kwargs) -> RenderedCamera:
     look = dataclasses.replace(CLEAN, read_noise=1.0)
     stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), look)
-    return RenderedCamera(stage, world, timing, now=clock.now, sleep=clock.sleep, **kwargs)
+    return RenderedCamera(stage, world, timing, clock=clock, **kwargs)
 
 
 def test_a_rendered_camera_keeps_its_own_time(tmp_path):
-    clock, world = Clock(), Asked(offset=100.0)
+    clock, world = SteppedClock(50.0), Asked(offset=100.0)
     timing = Timing(rate=25.0, latency=0.03, offset=-7.0, drift=1e-3)
     camera = rendered(timing, clock, world, truth=tmp_path / "truth_xz.csv")
     frames = [camera.read() for _ in range(51)]
@@ -246,22 +234,22 @@ def test_a_rendered_camera_keeps_its_own_time(tmp_path):
 
 
 def test_a_late_frame_shows_its_own_moment_and_only_old_ones_are_lost():
-    clock, world = Clock(), Asked(offset=0.0)
+    clock, world = SteppedClock(50.0), Asked(offset=0.0)
     camera = rendered(Timing(rate=25.0, latency=0.0, drift=0.0), clock, world)
     camera.read()
-    clock.time += 0.15
+    clock.sleep(0.15)
     late = [camera.read() for _ in range(3)]
     assert [f.index for f in late if f] == [1, 2, 3]
     np.testing.assert_allclose(world.times[1:], 50.0 + np.array([1, 2, 3]) / 25.0)
-    clock.time += 1.0
+    clock.sleep(1.0)
     assert camera.read().index > 20
-    assert clock.time - world.times[-1] <= 0.2 + 1e-9
+    assert clock.now() - world.times[-1] <= 0.2 + 1e-9
 
 
 def test_a_rendered_picture_is_what_a_camera_of_this_project_gives():
-    clock = Clock()
+    clock = SteppedClock(50.0)
     stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), Look())
-    camera = RenderedCamera(stage, Asked(0.0), now=clock.now, sleep=clock.sleep)
+    camera = RenderedCamera(stage, Asked(0.0), clock=clock)
     frame = camera.read()
     assert frame is not None
     assert (frame.image.dtype, frame.image.shape) == (np.uint8, (480, 640))

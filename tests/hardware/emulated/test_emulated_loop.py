@@ -12,6 +12,7 @@ from bolfi_liquids.hardware.motion.pour_paths import pour_path, ready_to_pour
 from bolfi_liquids.hardware.motion.stir_paths import retract, stir
 from bolfi_liquids.hardware.recorder.sample import SAMPLES
 from bolfi_liquids.hardware.robot.orders import (
+    Assignment,
     Began,
     Checked,
     Done,
@@ -32,13 +33,15 @@ PERIOD = 1.0 / RIG.robot.rate
 
 
 @pytest.fixture
-def loop(stepped_loop):
+def loop(stepped_loop, tmp_path):
     """Makes the loop of a rig whose arm is emulated, at rest where a path starts."""
 
     def make(rig, path, tool="stirring"):
         controller = emulated(rig, path.pose[0], tool=tool).controller
         clock = SteppedClock(controller.begun)
-        return stepped_loop(rig, tool, controller._replace(clock=clock), clock)
+        arm, probes = controller._replace(clock=clock), np.empty((0, 6))
+        to = Assignment(rig, arm, tool, True, str(tmp_path), probes, cameras=False)
+        return stepped_loop(to, clock)
 
     return make
 

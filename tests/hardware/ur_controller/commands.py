@@ -1,6 +1,7 @@
 """What ur_rtde's control script does for each number in its command register."""
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from bolfi_liquids.hardware.emulated.arm import SERVO_RATE
@@ -8,16 +9,24 @@ from bolfi_liquids.hardware.emulated.motion import JointState, Motion, joint_spe
 from bolfi_liquids.hardware.motion.kinematics import DhArm, forward, inverse
 from bolfi_liquids.hardware.motion.poses import compose
 
-from .machine import ProgramError, RunningScript
 from .moves import Plan, Timed, joint_move, line
 from .queued_arm import QueuedArm
 from .script import Kind, Waypoint
+
+if TYPE_CHECKING:
+    from .program import Program
+
+Command = Callable[["Program"], None]
 
 BRAKE_DECELERATION = 3.0  # rad/s2; of a motion whose thread was killed
 _ZERO = np.zeros(6)
 
 # carried out again whenever the script reads them, and answered at once
 REALTIME_COMMANDS = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, *range(66, 72)})
+
+
+class ProgramError(Exception):
+    """The script fails, as it would on the controller: it ends, and the arm stops."""
 
 
 def within_limits(arm: QueuedArm, pose: np.ndarray) -> bool:
@@ -42,8 +51,8 @@ def _plan(arm: QueuedArm, waypoint: Waypoint) -> Plan:
     return plan
 
 
-def _move(kind: Kind, *, is_pose: bool) -> Callable[[RunningScript], None]:
-    def run(program: RunningScript) -> None:
+def _move(kind: Kind, *, is_pose: bool) -> Command:
+    def run(program: "Program") -> None:
         *target, speed, acceleration = program.numbers(0, 8)
         waypoint = Waypoint(kind, is_pose, tuple(target), speed, acceleration, None)
         program.end_move()
@@ -53,7 +62,7 @@ def _move(kind: Kind, *, is_pose: bool) -> Callable[[RunningScript], None]:
     return run
 
 
-def _move_path(program: RunningScript) -> None:
+def _move_path(program: "Program") -> None:
     path = program.script.path
     program.end_move()
     thread = "move" if program.integer(1) == 1 else None
@@ -62,7 +71,7 @@ def _move_path(program: RunningScript) -> None:
     )
 
 
-def _fresh(program: RunningScript, count: int) -> list[float] | None:
+def _fresh(program: "Program", count: int) -> list[float] | None:
     """Numbers of a real-time command, or None while they stay what they were."""
     numbers = program.numbers(0, count)
     latest = (program.integer(0), *numbers)
@@ -72,8 +81,8 @@ def _fresh(program: RunningScript, count: int) -> list[float] | None:
     return numbers
 
 
-def _servo(*, is_pose: bool) -> Callable[[RunningScript], None]:
-    def run(program: RunningScript) -> None:
+def _servo(*, is_pose: bool) -> Command:
+    def run(program: "Program") -> None:
         numbers = _fresh(program, 11)
         if numbers is None:
             return
@@ -87,8 +96,8 @@ def _servo(*, is_pose: bool) -> Callable[[RunningScript], None]:
     return run
 
 
-def _speed(*, linear: bool) -> Callable[[RunningScript], None]:
-    def run(program: RunningScript) -> None:
+def _speed(*, linear: bool) -> Command:
+    def run(program: "Program") -> None:
         numbers = _fresh(program, 7)
         if numbers is None:
             return
@@ -100,25 +109,25 @@ def _speed(*, linear: bool) -> Callable[[RunningScript], None]:
     return run
 
 
-def _stop_plan(program: RunningScript, rate: float, *, linear: bool) -> Plan:
+def _stop_plan(program: "Program", rate: float, *, linear: bool) -> Plan:
     mounted = program.arm.mounted
     if linear:
         return lambda _: twist(mounted, _ZERO, rate, ends=True)
     return lambda _: joint_speed(mounted.arm, _ZERO, rate, ends=True)
 
 
-def _speed_stop(program: RunningScript) -> None:
+def _speed_stop(program: "Program") -> None:
     program.end_thread("speed")
     plan = _stop_plan(program, program.number(0), linear=program.speeds_are_linear)
     program.begin([plan], None)
 
 
-def _servo_stop(program: RunningScript) -> None:
+def _servo_stop(program: "Program") -> None:
     program.end_thread("servo")
     program.begin([_stop_plan(program, program.number(0), linear=True)], None)
 
 
-def _stop(program: RunningScript) -> None:
+def _stop(program: "Program") -> None:
     """stopL and stopJ alike: whether the stop is linear depends on whether one was asynchronous."""
     if program.thread == "stop":
         program.end_thread("stop")
@@ -132,7 +141,7 @@ def _stop(program: RunningScript) -> None:
     program.begin([plan], "stop" if asynchronous else None)
 
 
-def _inverse(program: RunningScript, near: np.ndarray | None = None) -> np.ndarray:
+def _inverse(program: "Program", near: np.ndarray | None = None) -> np.ndarray:
     pose, arm = np.array(program.numbers(0)), program.arm
     start = arm.state.joints if near is None else near
     found = inverse(arm.mounted.arm, pose, start, tcp=arm.mounted.tcp)
@@ -141,43 +150,43 @@ def _inverse(program: RunningScript, near: np.ndarray | None = None) -> np.ndarr
     return found.joints
 
 
-def _has_inverse(program: RunningScript) -> None:
+def _has_inverse(program: "Program") -> None:
     program.give_integer(within_limits(program.arm, np.array(program.numbers(0))))
 
 
-def _joints_within(program: RunningScript) -> None:
+def _joints_within(program: "Program") -> None:
     joints = np.array(program.numbers(0))
     program.give_integer(bool((np.abs(joints) <= program.arm.mounted.arm.joint_limit).all()))
 
 
-def _forward(program: RunningScript) -> None:
+def _forward(program: "Program") -> None:
     model: DhArm = program.arm.mounted.arm
     program.give(forward(model, program.numbers(0), tcp=program.numbers(6)))
 
 
-def _set_tcp(program: RunningScript) -> None:
+def _set_tcp(program: "Program") -> None:
     offset = np.array(program.numbers(0))
     if not np.isfinite(offset).all():
         raise ProgramError(f"TCP offset {offset.tolist()} is not finite")
     program.arm.mount(offset)
 
 
-def _set_payload(program: RunningScript) -> None:
+def _set_payload(program: "Program") -> None:
     mass, *centre = program.numbers(0, 4)
     program.machine.set_payload(mass, tuple(centre))
 
 
-def _on_e_series(run: Callable[[RunningScript], None]) -> Callable[[RunningScript], None]:
+def _on_e_series(run: Command) -> Command:
     """ur_rtde strikes these lines from the script for older controllers: nothing happens there."""
 
-    def guarded(program: RunningScript) -> None:
+    def guarded(program: "Program") -> None:
         if program.machine.version >= (5, 4):
             run(program)
 
     return guarded
 
 
-COMMANDS: dict[int, Callable[[RunningScript], None]] = {
+COMMANDS: dict[int, Command] = {
     1: _move("movej", is_pose=False),
     2: _move("movej", is_pose=True),
     3: _move("movel", is_pose=True),

@@ -1,4 +1,12 @@
-"""The controller: program, safety and arm, one tick after the other."""
+"""The controller: program, safety and arm, one tick after the other.
+
+It answers ur_rtde's real client as a UR controller does: registers, recipes, the control script's
+commands and threads, watchdog, protective stop, dashboard. Its arm is that of the emulated rig,
+with a queue of motions. Not emulated: forces and inertia of the arm, payload errors, blends (a path
+stops at its corners), the real servo filter (an assumed one stands for it), safety planes, force
+mode, servoC, moveP, freedrive, scripts other than ur_rtde's. Passing here is no acceptance test of
+a robot.
+"""
 
 import sys
 from typing import NamedTuple
@@ -15,8 +23,8 @@ from bolfi_liquids.hardware.host_clock import REAL_CLOCK, HostClock
 from bolfi_liquids.hardware.motion.kinematics import ARMS
 from bolfi_liquids.hardware.safety.guards import NORMAL, PLAYING
 
+from .commands import ProgramError
 from .force import ForceReading
-from .machine import ProgramError
 from .program import Program
 from .queued_arm import QueuedArm
 from .registers import Registers

@@ -1,14 +1,19 @@
 """ur_rtde's control script at work: reads a command register each tick, answers, owns threads."""
 
+from typing import TYPE_CHECKING, Literal
+
 from bolfi_liquids.hardware.motion.poses import Numbers
 
-from .commands import COMMANDS, REALTIME_COMMANDS
-from .machine import Machine, ProgramError, Thread
+from .commands import COMMANDS, REALTIME_COMMANDS, ProgramError
 from .moves import Plan
 from .queued_arm import QueuedArm
 from .registers import Registers
 from .script import Script, Waypoint
 
+if TYPE_CHECKING:
+    from .controller import Controller
+
+Thread = Literal["move", "stop", "servo", "speed"]
 READY, DONE = 1, 2
 STOP_SCRIPT = 255
 _RUNNING = 1 << 15
@@ -30,7 +35,7 @@ class Program:
         latest: The real-time command that was carried out last, with its numbers.
     """
 
-    def __init__(self, script: Script, machine: Machine):
+    def __init__(self, script: Script, machine: "Controller"):
         self.script = script
         self.machine = machine
         self.thread: Thread | None = None

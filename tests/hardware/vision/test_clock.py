@@ -22,6 +22,7 @@ from bolfi_liquids.hardware.vision import (
 )
 from rendered_scenes import MovingWorld, rehearsal_camera, rehearsal_scene, stick_view
 from scipy.interpolate import CubicSpline
+from stepped_clock import SteppedClock
 
 cv2 = pytest.importorskip("cv2")
 
@@ -158,19 +159,6 @@ def test_a_pose_needs_frames_that_show_the_marker():
         refine_orientation(camera, np.zeros((300, 2)), behind)
 
 
-class WaitingClock:
-    """A computer's clock that only waiting moves."""
-
-    def __init__(self) -> None:
-        self.time = 50.0
-
-    def now(self) -> float:
-        return self.time
-
-    def sleep(self, duration: float) -> None:
-        self.time += duration
-
-
 def inclination_of(time):
     return np.radians([8 * np.sin(6.9 * time) + 3 * np.sin(2.3 * time), 7 * np.sin(8.1 * time + 1)])
 
@@ -179,13 +167,11 @@ def filmed(view: str, timing: Timing, frames: int):
     """Measurements of a rendered stir; robot's clock minus the computer's is START - 50."""
     world = MovingWorld(pivot, inclination_of, offset=START - 50.0)
     scene, camera = rehearsal_scene(view), rehearsal_camera(view)
-    waiting = WaitingClock()
     rendered = RenderedCamera(
         prepare(scene, camera, Look(), seed=timing.seed),
         world,
         timing,
-        now=waiting.now,
-        sleep=waiting.sleep,
+        clock=SteppedClock(50.0),
     )
     meter, found = FrameMeter(stick_view(scene, camera)), []
     for _ in range(frames):
