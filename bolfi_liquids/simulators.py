@@ -184,7 +184,7 @@ Batched = Callable[[Mapping[str, Any], Any], "PourBatch"]
 """(theta, seeds) -> the pours to be made; theta holds liquid, coefficients and `RATE`."""
 
 
-class Outcome(Protocol):
+class PourOutcome(Protocol):
     """Which pours are made of each theta, and what is kept of them; two equal ones compare so."""
 
     def __call__(
@@ -213,7 +213,7 @@ class PourSimulator(FluidSimulator):
 
     cups: "Cups"
     density: float
-    outcome: Outcome
+    outcome: PourOutcome
     effects: tuple[str, ...] = ()
     particles: int = 0
 

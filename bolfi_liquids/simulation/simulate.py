@@ -191,7 +191,7 @@ def _planned(recording: Recording, path: str | TimedPath | None) -> Recording:
 
 
 @dataclass(frozen=True)
-class Landed:
+class LandedParticles:
     """The retained fraction, then the landing of each particle [m]: (B, 1 + 2 particles).
 
     Attributes:
@@ -262,7 +262,7 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     check_rate(angular_velocity, cups, Argument("angular_velocity"))
     batch = batch_of(liquid, check_effects(effects, "pour"), particles, seed)
     targets.check_single(batch.single)
-    outcome, particles = Landed(angular_velocity), batch.one.particles
+    outcome, particles = LandedParticles(angular_velocity), batch.one.particles
     simulator = PourSimulator(cups, density, outcome, particles=particles)
     retained = slice(0, 1)  # what has not landed is NaN
     with open_compute(executor, timeout) as compute:
