@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field
 
 from ..errors import Argument, InputError
-from ..numerals import parse_number
 from .settings import Particles, Seed, checked
+from .table import parse_number
 
 if TYPE_CHECKING:
     from ..models import Liquid

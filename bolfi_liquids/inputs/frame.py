@@ -42,6 +42,16 @@ MAX_TURN_ERRORS = 3.0
 """Standard errors by which a turn must differ from none."""
 
 
+CAUSES = {
+    (False, 2): f"the signs (`flip`) of {' and '.join(PLANES)}, or of x and y, are wrong",
+    (True, 0): f"the sign (`flip`) of {PLANES[1]}, or of y, is wrong",
+    (True, 1): "the planes are exchanged",
+    (True, 2): f"the sign (`flip`) of {PLANES[0]}, or of x, is wrong",
+    (True, 3): "the planes are exchanged, and their signs are wrong",
+}
+"""What is likely wrong, by whether the frame is mirrored, and its turn in quarters."""
+
+
 class FrameRotation(NamedTuple):
     """How the frame of the inclination lies to that of the positions.
 
@@ -55,14 +65,6 @@ class FrameRotation(NamedTuple):
     angle_deg: float
     error_deg: float
     mirrored: bool
-
-    def __str__(self) -> str:
-        return f"{_whole(self.angle_deg)} +- {_whole(self.error_deg)} deg"
-
-
-def _whole(angle_deg: float) -> int:
-    """Without the sign that a format gives to a rounded zero."""
-    return round(angle_deg)
 
 
 def found_turn(recording: Recording) -> FrameRotation | None:
@@ -82,27 +84,6 @@ def found_turn(recording: Recording) -> FrameRotation | None:
     )
 
 
-def trailing(recording: Recording) -> tuple[float, ...]:
-    """Correlation of each plane's inclination with what the gripper has moved of late along it.
-
-    From -0.4 to -1 for a stick that trails. NaN where the gripper hardly moves that way.
-    """
-    pair = _pair(recording)
-    if pair is None:
-        return (np.nan, np.nan)
-    inclination, way = pair
-    moved = way[:, 0] - way.mean(axis=1)
-    return tuple(
-        float(np.corrcoef(angle, along)[0, 1])
-        if np.ptp(at) >= MIN_TRAVEL and np.ptp(angle) > 0.0
-        else np.nan
-        for angle, along, at in (
-            (np.real(inclination), np.real(moved), np.real(way[:, 0])),
-            (np.imag(inclination), np.imag(moved), np.imag(way[:, 0])),
-        )
-    )
-
-
 def frame_warnings(recordings: Iterable[Recording]) -> list[str]:
     """What is wrong with the frames of recordings, and how it is mended."""
     return [f"{one.path}: {text}" for one in recordings for text in frame_faults(one)]
@@ -116,35 +97,21 @@ def named_faults(recordings: Iterable[Recording]) -> tuple[str, ...]:
 def frame_faults(recording: Recording) -> Iterator[str]:
     """What is wrong with the frame of a recording; nothing where none is found."""
     turn = found_turn(recording)
-    if turn is None or not (turn.mirrored or _is_turned(turn)):
+    if turn is None:
         return
-    xz, yz = PLANES
-    quarters = round(turn.angle_deg / 90.0)
-    quarter = quarters % 4 if abs(turn.angle_deg - 90.0 * quarters) <= MAX_TURN_DEG else None
-    ahead = "the stick leans ahead of the gripper: its sign (`flip`) is wrong, or that of"
-    if not turn.mirrored and quarter == 2:
-        yield f"{xz}: {ahead} x; the same holds for {yz} and y (or add 180 to `yaw_deg`)"
-    elif not turn.mirrored:
-        yield (
-            f"the inclination is turned by {turn} against x and y: correct the axes, or add "
-            f"{_whole(turn.angle_deg)} to `yaw_deg` in the map of `bolfi-liquids import`, where "
-            "none is 0"
-        )
-    elif quarter == 0:
-        yield f"{yz}: {ahead} y"
-    elif quarter == 2:
-        yield f"{xz}: {ahead} x"
-    elif quarter is not None:
-        yield f"{xz}: the stick follows y more than x: the planes are exchanged"
-    else:
-        yield (
-            "x and y, or the planes, form a mirrored frame, which is turned as well "
-            f"({turn}): correct one sign (`flip`) first, and then `yaw_deg`"
-        )
-
-
-def _is_turned(turn: FrameRotation) -> bool:
-    return abs(turn.angle_deg) > max(MAX_TURN_DEG, MAX_TURN_ERRORS * turn.error_deg)
+    angle, error = turn.angle_deg, turn.error_deg
+    if not turn.mirrored and abs(angle) <= max(MAX_TURN_DEG, MAX_TURN_ERRORS * error):
+        return
+    quarters = round(angle / 90.0)
+    near = abs(angle - 90.0 * quarters) <= MAX_TURN_DEG
+    cause = CAUSES.get((turn.mirrored, quarters % 4)) if near else None
+    mirrored = "mirrored and " if turn.mirrored else ""
+    flip = f" after `flip` of {PLANES[1]}" if turn.mirrored else ""
+    yield (
+        f"the inclination is {mirrored}turned by {round(angle)} +- {round(error)} deg against x "
+        f"and y: {cause or f'add {round(angle)} to `yaw_deg`{flip}'}; "
+        "correct the map of `bolfi-liquids import`, or the axes of the rig"
+    )
 
 
 def _pair(recording: Recording) -> tuple[NDArray, NDArray] | None:
