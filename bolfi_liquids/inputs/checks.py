@@ -439,6 +439,16 @@ INCLINATION = (
             most=np.pi / 2,
             unit="rad",
         ),
+    ),
+    Rule(
+        ", ".join((*AXES, *PLANES)),
+        "samples that jump out and back",
+        _torn,
+        "look at what was measured, and record again; one in a hundred counts as missing",
+        most=0,
+    ),
+    *_for_each(
+        PLANES,
         lambda plane, name: Rule(
             name,
             "longest time of one number while the gripper moves",
@@ -477,13 +487,6 @@ INCLINATION = (
         "give it in rad: it is converted from degrees once only",
         least=0.2,
         unit="deg",
-    ),
-    Rule(
-        ", ".join((*AXES, *PLANES)),
-        "samples that jump out and back",
-        _torn,
-        "look at what was measured, and record again; one in a hundred counts as missing",
-        most=0,
     ),
 )
 SCENE = (

@@ -80,7 +80,11 @@ class Column[Unit: str](Given):
         if self.unit == "iso":
             return _stamps(table, self.column) + self.offset
         factor = UNITS[self.unit]
-        numbers = table.numbers(self.column, fix=HEADER_FIX)
+        try:
+            numbers = table.numbers(self.column, fix=HEADER_FIX)
+        except InputError as err:
+            fix = f'{err.fix}; date and time are read as {ISO} by unit = "iso"'
+            raise InputError(err.what, where=err.where, fix=fix) from None
         return (-factor if self.flip else factor) * (numbers + self.offset)
 
 

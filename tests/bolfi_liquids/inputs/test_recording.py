@@ -62,6 +62,10 @@ def in_milliseconds(data):
     return data.assign_coords(time=("time", 1000.0 * data["time"].to_numpy(), {"units": "s"}))
 
 
+def _nanoseconds(data):
+    return (1e9 * data["time"].to_numpy()).astype("timedelta64[ns]")
+
+
 BAD = {
     "no time": (lambda d: d.drop_vars("time"), "time", "missing"),
     "no x": (lambda d: d.drop_vars("x"), "x", "missing"),
@@ -123,6 +127,16 @@ BAD = {
         "x",
         "int64",
     ),
+    "dates": (
+        lambda d: d.assign_coords(time=np.datetime64("2026-11-29", "ns") + _nanoseconds(d)),
+        "time",
+        "holds dates",
+    ),
+    "nanoseconds": (
+        lambda d: d.assign_coords(time=_nanoseconds(d).astype(np.int64)),
+        "time",
+        "holds int64",
+    ),
     "cup of 1 m": (with_attribute("cup_radius", 1.0), "cup_radius", "1 m"),
     "tiny cup": (with_attribute("cup_radius", 0.0004), "cup_radius", "0.0004 m"),
     "heavy stick": (with_attribute("stick_mass", 1.7), "stick_mass", "1.7 kg"),
@@ -152,7 +166,7 @@ BAD = {
             "inclination_xz", lambda v: 1.5 * np.random.default_rng(0).uniform(-1, 1, len(v))
         ),
         "inclination_xz",
-        "57.5627 deg",
+        " of 201",
     ),
     "small degrees": (
         with_values("inclination_xz", lambda v: np.degrees(v) / 5),
