@@ -83,6 +83,11 @@ class Recording:
             **{subject: ", ".join(told) for subject, told in parts.items() if told},
         }
 
+    def values(self, name: str) -> NDArray[np.float64]:
+        """A variable of its file, with SI units, shape (T,)."""
+        columns = (self.time, *self.gripper.position.T, *self.inclination.T)
+        return dict(zip(UNITS, columns, strict=True))[name]
+
     def number(self, name: str) -> float:
         """A numeric attribute, in SI units."""
         return float(self.attrs[name])

@@ -76,8 +76,15 @@ class Table:
                 raise _misfit(self.path, line, np.sum(row != None), len(self.header))  # noqa: E711
         return self.cells[:, at]
 
-    def numbers(self, name: str, fix: str = "correct the header") -> NDArray[np.float64]:
+    def numbers(
+        self, name: str, fix: str = "correct the header", remark: str = ""
+    ) -> NDArray[np.float64]:
         """Numbers of a column, shape (rows,); NaN where one is missing.
+
+        Args:
+            name: Of the column.
+            fix: What to do if there is none.
+            remark: What to say besides if a cell holds something else.
 
         Raises:
             InputError: There is no such column, or a cell holds something else.
@@ -94,7 +101,7 @@ class Table:
                     where=self.where(self.lines[at], name),
                     fix="correct the cell, or leave it empty where a value is missing; this "
                     f"table has {self.decimal!r} as its decimal sign (a decimal comma needs ';' "
-                    "between the cells), and thousands are not set apart",
+                    f"between the cells), and thousands are not set apart{remark}",
                 ) from None
         return numbers
 

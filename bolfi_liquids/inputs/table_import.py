@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,7 @@ SLOWER = 1.5  # times a step of a log: a longer one is another's, or leaves a ro
 HEADER_FIX = "correct the map: `column`, `skip` or `delimiter`"
 MAP_FIX = "compare with what `bolfi-liquids import --template` writes"
 ISO = "2026-11-29T13:05:21.250"
+DATES = f'; date and time are read as {ISO} by unit = "iso"'
 
 UNITS = {
     **{"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
@@ -80,11 +81,8 @@ class Column[Unit: str](Given):
         if self.unit == "iso":
             return _stamps(table, self.column) + self.offset
         factor = UNITS[self.unit]
-        try:
-            numbers = table.numbers(self.column, fix=HEADER_FIX)
-        except InputError as err:
-            fix = f'{err.fix}; date and time are read as {ISO} by unit = "iso"'
-            raise InputError(err.what, where=err.where, fix=fix) from None
+        remark = DATES if self.unit in get_args(Seconds) else ""
+        numbers = table.numbers(self.column, fix=HEADER_FIX, remark=remark)
         return (-factor if self.flip else factor) * (numbers + self.offset)
 
 

@@ -73,9 +73,9 @@ SPOILED = {
     "of one number while the gripper moves": without_inclination,
     "starts in motion": lambda stir: stir.isel(time=slice(40, None)),
     "room between stick and wall": shifted("x", 0.05),
-    "lowest place of the tip": shifted("z", -0.05),
+    "height of the tip": shifted("z", -0.05),
     "floats up": lambda stir: stir.assign_attrs(stick_density=300.0),
-    "fill / cup_height": lambda stir: stir.assign_attrs(fill=0.08),
+    "part = 1.06667 of cup_height": lambda stir: stir.assign_attrs(fill=0.08),
 }
 
 
