@@ -92,13 +92,12 @@ class Rule(NamedTuple):
 def check_values(recording: Recording) -> None:
     """Raise `InputError` at the first value that no simulator could use."""
     for name, (least, most, unit) in LIMITS.items():
-        value = recording.attrs.get(name)
-        if value is None and name in STICK_WEIGHT:
+        if name in STICK_WEIGHT and name not in recording.attrs:
             continue
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        size = float(value) if is_number else np.nan
+        value = recording.attrs[name]
+        size = value if isinstance(value, int | float) and not isinstance(value, bool) else np.nan
         if not 0.0 < size or not least <= size <= most:
-            given = f"{size:g} {unit}" if is_number else " ".join(repr(value).split())
+            given = f"{size:g} {unit}" if size == value else " ".join(repr(value).split())
             raise InputError(
                 f"{given:.80}, {_span(least, most)} {unit} allowed",
                 where=f"{recording.path}: attribute {name}",
