@@ -69,18 +69,21 @@ class FrameRotation(NamedTuple):
 
 def found_turn(recording: Recording) -> FrameRotation | None:
     """The turn of a recording's frame; None where its path does not tell it."""
-    pair = _pair(recording)
-    if pair is None:
+    path = recording.gripper.position[:, :2]
+    inclination = recording.inclination @ (1.0, 1j)
+    seen = np.isfinite(inclination)
+    travel = (np.nanmax(path, axis=0) - np.nanmin(path, axis=0)).max()
+    if travel < MIN_TRAVEL or seen.sum() < N_BLOCKS * MIN_SAMPLES_PER_BLOCK:
         return None
-    inclination, delayed = pair
+    delayed, inclination = _delayed(recording)[seen], inclination[seen]
     straight, mirrored = _fit(inclination, delayed), _fit(inclination.conj(), delayed)
     is_mirrored = mirrored.residual < MAX_RESIDUAL_RATIO * straight.residual
     best = mirrored if is_mirrored else straight
     if best.residual > MAX_RESIDUAL_RATIO * best.worst or best.followed < MIN_FOLLOWED:
         return None
-    seen = inclination.conj() if is_mirrored else inclination
+    followed = inclination.conj() if is_mirrored else inclination
     return FrameRotation(
-        float(np.degrees(best.angle)), _error_deg(seen, delayed, best.angle), is_mirrored
+        float(np.degrees(best.angle)), _error_deg(followed, delayed, best.angle), is_mirrored
     )
 
 
@@ -114,25 +117,14 @@ def frame_faults(recording: Recording) -> Iterator[str]:
     )
 
 
-def _pair(recording: Recording) -> tuple[NDArray, NDArray] | None:
-    """Inclination (n,) and positions at each delay before it (n, delays); None where too few."""
-    time, position = recording.time, recording.gripper.position[:, :2]
-    if max(np.ptp(axis[np.isfinite(axis)]) for axis in position.T) < MIN_TRAVEL:
-        return None
-    way = np.empty((len(time), len(DELAYS)), dtype=complex)
-    for at, delay in enumerate(DELAYS):
-        x, y = (_at(time - delay, time, axis) for axis in position.T)
-        way[:, at] = x + 1j * y
-    inclination = recording.inclination[:, 0] + 1j * recording.inclination[:, 1]
-    seen = np.isfinite(inclination)
-    if seen.sum() < N_BLOCKS * MIN_SAMPLES_PER_BLOCK:
-        return None
-    return inclination[seen], way[seen]
-
-
-def _at(wanted: NDArray, time: NDArray, values: NDArray) -> NDArray:
-    known = np.isfinite(values)
-    return np.interp(wanted, time[known], values[known])
+def _delayed(recording: Recording) -> NDArray[np.complex128]:
+    """The gripper's x + i y at each sample, and each delay before it, shape (T, delays)."""
+    time, way = recording.time, 0.0
+    for axis, factor in zip(recording.gripper.position.T[:2], (1.0, 1j), strict=True):
+        known = np.isfinite(axis)
+        before = [np.interp(time - delay, time[known], axis[known]) for delay in DELAYS]
+        way = way + factor * np.stack(before, axis=-1)
+    return np.asarray(way)
 
 
 class _RotationFit(NamedTuple):
