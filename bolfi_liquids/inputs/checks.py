@@ -150,15 +150,23 @@ def _usual_step(recording: Recording, field: str) -> Measured:
     return float(np.median(np.diff(recording.time)))
 
 
-def _clock_difference(recording: Recording, field: str) -> Measured:
-    """Of two logs of which one ends before the other begins; 0 where they overlap."""
-    position = np.isfinite(recording.gripper.position).any(axis=1)
-    seen = np.isfinite(recording.inclination).any(axis=1)
-    if not position.any() or not seen.any():
+def clock_difference(time: NDArray, position: NDArray, inclination: NDArray) -> float:
+    """Of two logs of which one ends before the other begins [s]; 0 where they overlap.
+
+    Args:
+        time: Times of all samples [s], shape (T,).
+        position: Of the gripper [m], shape (T, 3); NaN where it is missing.
+        inclination: Of the stick [rad], shape (T, 2); likewise.
+    """
+    arm = time[np.isfinite(position).any(axis=1)]
+    camera = time[np.isfinite(inclination).any(axis=1)]
+    if not len(arm) or not len(camera) or (arm[0] <= camera[-1] and camera[0] <= arm[-1]):
         return 0.0
-    arm, camera = recording.time[position], recording.time[seen]
-    overlap = arm[0] <= camera[-1] and camera[0] <= arm[-1]
-    return 0.0 if overlap else float(abs(camera[0] - arm[0]))
+    return float(abs(camera[0] - arm[0]))
+
+
+def _clock_difference(recording: Recording, field: str) -> Measured:
+    return clock_difference(*recording.gripper, recording.inclination)
 
 
 def _part(recording: Recording, field: str) -> Measured:

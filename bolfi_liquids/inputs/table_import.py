@@ -15,7 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from ..errors import Argument, InputError
 from ..files import given_path, new_netcdf, write_netcdf, write_text
-from .checks import MAX_GRIPPER_GAP, MIN_SEEN, check_values
+from .checks import MAX_GRIPPER_GAP, MIN_SEEN, check_values, clock_difference
 from .fields import AXES, PLANES, STICK_WEIGHT
 from .frame import frame_faults
 from .open import read_recording
@@ -340,6 +340,8 @@ def at_camera_times(values: dict[str, NDArray]) -> tuple[dict[str, NDArray], str
     if not len(seen_step) or seen.mean() >= MIN_SEEN or not (step > 0.0).all():
         return values, ""
     if np.median(seen_step) < SLOWER * np.median(step):
+        return values, ""
+    if clock_difference(time, *(np.stack([values[n] for n in of], -1) for of in (AXES, PLANES))):
         return values, ""
     kept = {name: one[seen] for name, one in values.items()}
     for axis in AXES:

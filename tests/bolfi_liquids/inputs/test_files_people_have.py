@@ -4,10 +4,12 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
+from bolfi_liquids.hardware.motion import star
 
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.inputs.bundled import bundled_recording
+from bolfi_liquids.inputs.bundled import RECORDED_LIQUIDS, bundled_recording
 from bolfi_liquids.inputs.open import open_recording
+from bolfi_liquids.inputs.recording import JUMPS, torn_values
 from bolfi_liquids.inputs.table_import import import_table
 
 FIELDS = ("time", "x", "y", "z", "inclination_xz", "inclination_yz")
@@ -121,6 +123,13 @@ def two_clocks(rows, truth):
     return [rows[0], *arm, *camera]
 
 
+def two_clocks_and_a_fast_arm(rows, truth):
+    header, *others = two_clocks(rows, truth)
+    arm, camera = others[: len(others) // 2], others[len(others) // 2 :]
+    fast = [[repr(float(row[0]) + 0.008 * k), *row[1:]] for row in arm for k in range(4)]
+    return [header, *fast, *camera]
+
+
 def many_torn(rows, truth):
     for row in rows[3::20]:
         row[4] = "1.2"
@@ -142,6 +151,7 @@ REFUSED = {
     ),
     "time of day": (dates("%H:%M:%S.%f"), {}, ("line 2", "13:26:40", "iso")),
     "two clocks": (two_clocks, {}, ("clocks", "3600 s", "shift")),
+    "two clocks, a fast arm": (two_clocks_and_a_fast_arm, {}, ("clocks", "3600 s", "shift")),
     "many torn": (many_torn, {}, ("10 of 201", "sample 2", "record again")),
     "thousands": (
         lambda rows, truth: [*rows[:5], [*rows[5][:1], "1 234.5", *rows[5][2:]], *rows[6:]],
@@ -179,6 +189,15 @@ def test_one_torn_value_is_named_and_missing(made, truth, tmp_path, field, value
     np.testing.assert_allclose(columns, expected, atol=1e-12)
 
 
-def test_nothing_of_a_stir_is_torn(truth):
-    for liquid in ("water", "oil", "glycerin", "gel"):
-        assert bundled_recording(liquid).torn == ()
+@pytest.mark.parametrize("speed", [0.1, 1.0])  # m/s
+@pytest.mark.parametrize("rate", [10.0, 30.0, 125.0])  # Hz
+def test_corners_of_a_path_are_not_torn(speed, rate):
+    path = star(speed=speed, height=0.2, rest=1.0)
+    time = np.arange(path.time[0], path.time[-1], 1.0 / rate)
+    for axis, jump in zip(path.position.T, JUMPS.values(), strict=False):
+        assert not torn_values(np.interp(time, path.time, axis), jump).any()
+
+
+@pytest.mark.parametrize("liquid", RECORDED_LIQUIDS)
+def test_nothing_of_a_stir_is_torn(liquid):
+    assert bundled_recording(liquid).torn == ()
