@@ -26,10 +26,10 @@ SUBJECTS = {
 """Attributes of a recording's file, by what they are of."""
 
 JUMPS = {**dict.fromkeys(AXES, 0.05), **dict.fromkeys(PLANES, np.radians(30.0))}
-"""By which a sample leaves both of its neighbours, which agree, if it is torn [m] or [rad]."""
+"""By which a sample leaves both of its neighbours, which agree, if it is torn [m] or [rad].
 
-MAX_STEPS = 10.0
-"""Median steps between samples that such a jump exceeds: a corner of a fast path does not."""
+At 10 Hz that takes an acceleration of 10 m/s2, or a swing of more than 90 degrees.
+"""
 
 MAX_TORN_SHARE = 0.01
 """Of torn samples that count as missing; one always may."""
@@ -185,16 +185,13 @@ def torn_values(values: NDArray, jump: float) -> NDArray[np.bool_]:
 
     Args:
         values: Shape (T,); NaN where one is missing, which has no neighbour.
-        jump: Smallest distance from the neighbours; `MAX_STEPS` may make it larger.
+        jump: Smallest distance from the neighbours.
 
     Returns:
         Shape (T,).
     """
     torn = np.zeros(len(values), bool)
     known = np.flatnonzero(np.isfinite(values))
-    if len(known) < 3:
-        return torn
-    jump = max(jump, MAX_STEPS * float(np.median(np.abs(np.diff(values[known])))))
     before, value, after = (values[known[at : len(known) - 2 + at]] for at in range(3))
     agree = np.abs(after - before) < 0.5 * jump
     torn[known[1:-1]] = agree & (np.abs(value - before) > jump) & (np.abs(after - value) > jump)

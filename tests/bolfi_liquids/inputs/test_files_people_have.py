@@ -192,7 +192,7 @@ def test_one_torn_value_is_named_and_missing(made, truth, tmp_path, field, value
 @pytest.mark.parametrize("speed", [0.1, 1.0])  # m/s
 @pytest.mark.parametrize("rate", [10.0, 30.0, 125.0])  # Hz
 def test_corners_of_a_path_are_not_torn(speed, rate):
-    path = star(speed=speed, height=0.2, rest=1.0)
+    path = star(speed=speed, height=0.2, radius=0.1)
     time = np.arange(path.time[0], path.time[-1], 1.0 / rate)
     for axis, jump in zip(path.position.T, JUMPS.values(), strict=False):
         assert not torn_values(np.interp(time, path.time, axis), jump).any()
