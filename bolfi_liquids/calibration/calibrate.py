@@ -15,7 +15,7 @@ from ..inputs.frame import frame_warnings
 from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import Pours, table_and_cups
 from ..inputs.prior import check_prior, default_prior, describe_prior, read_prior
-from ..inputs.recording import Recording, aborted_recordings
+from ..inputs.recording import Recording, recording_warnings
 from ..inputs.settings import (
     CalibrationSettings,
     CriticismSettings,
@@ -136,7 +136,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         if table is not None:
             keep_pours(path, table, made_with)
             run.write_summary()
-        for notice in [*aborted_recordings(opened), *frame_warnings(opened)]:
+        for notice in [*recording_warnings(opened), *frame_warnings(opened)]:
             logger.warning(notice)
         if run.result("calibrate") is None:
             _calibrate(run, inputs, compute, progress)

@@ -1,162 +1,116 @@
-"""What a recording's values must satisfy for a simulator to replay it."""
+"""What a recording's values must satisfy for a simulator to replay it: one table of rules.
+
+Limits are those of sticks and cups that are stirred by hand or arm. A value in another unit than
+that of the file lies outside of them.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .fields import AXES, DENSITIES, LENGTHS, PLANES, STICK_WEIGHT
-from .inclination_checks import check_inclination_values
-from .recording import Recording
-from .start import above_liquid
+from .fields import AXES, PLANES, STICK_WEIGHT
+from .recording import JUMPS, Recording, torn_values
+from .start import above_liquid, noise_of
 
-MIN_SAMPLES = 10
+LIMITS = {
+    "cup_radius": (5e-3, 0.25, "m"),
+    "cup_height": (5e-3, 0.5, "m"),
+    "fill": (1e-3, 0.5, "m"),
+    "stick_radius": (2e-4, 0.05, "m"),
+    "stick_length": (0.02, 1.0, "m"),
+    "liquid_density": (50.0, 20_000.0, "kg/m3"),
+    "stick_density": (50.0, 20_000.0, "kg/m3"),
+    "stick_mass": (0.0, 2.0, "kg"),
+}
+"""Smallest and largest value of each attribute, and its unit."""
+
+OUTER = {"fill": "cup_height", "stick_radius": "cup_radius"}
+"""Sizes that must be smaller than another one."""
+
 MAX_GRIPPER_GAP = 0.2
 """Longest gap in the gripper's path that is interpolated [s]: less than half a stroke."""
-MAX_UNSEEN_TIME = 0.5
-"""Longest time that the stick may be out of sight [s]: a longer one hides most of a stroke."""
 MIN_SEEN = 0.5
 """Smallest share of a plane's samples in which the stick must have been seen."""
-MAX_INTERVAL = 1.0  # between samples [s]; more looks like milliseconds
-MAX_POSITION = 2.0  # of the gripper [m]; more looks like cm or mm
-SIZE_LIMITS = {
-    "cup_radius": (5e-3, 0.25),
-    "cup_height": (5e-3, 0.5),
-    "fill": (1e-3, 0.5),
-    "stick_radius": (2e-4, 0.05),
-    "stick_length": (0.02, 1.0),
-}
-"""Of cups and sticks that are stirred by hand or arm [m]; more looks like cm or mm."""
-MAX_MASS = 2.0  # of the stick [kg]; more looks like grams
-MAX_STICK_DENSITY = 25_000.0  # [kg/m3]; no stick is denser
-MAX_SPEED = 1.0  # of the gripper [m/s]; more looks like a time in other units
-MIN_TRAVEL = 1e-3  # of the gripper [m]; a liquid that is not stirred shows nothing
-MIN_DENSITY, MAX_DENSITY = 50.0, 20_000.0  # [kg/m3]; less looks like g/cm3
+MIN_FROZEN_TIME = 0.25
+"""Time of equal numbers that is no coincidence of a coarse scale [s]."""
+MIN_SPEED_SHARE = 0.2
+"""Of the gripper's usual speed, above which it moves."""
+MAX_NOISE_SHARE = 0.8
+"""Of an inclination's standard deviation, up to which noise is not judged."""
+RIM_MARGIN = np.radians(10.0)
+"""Beyond the angle at which the stick lies on the cup's rim [rad]."""
+SPEED_TIME = 0.1
+"""Time over which the gripper's speed is taken [s]."""
+MIN_FAST = 0.05
+"""Speed of the gripper from which every stick leans visibly [m/s]."""
+
+Measured = float | tuple[float, str]
+"""A value, perhaps with where or how it came about."""
+
+
+class Rule(NamedTuple):
+    """A quantity of a recording, its limits, and what to do beyond them.
+
+    Attributes:
+        fields: Variables or attributes that it holds for, one by one.
+        quantity: Its name.
+        measure: Its value in a recording for a field; NaN lies outside of all limits.
+        least: The smallest value allowed.
+        most: The largest value allowed.
+        unit: Of value and limits.
+        fix: The remedy.
+    """
+
+    fields: tuple[str, ...]
+    quantity: str
+    measure: Callable[[Recording, str], Measured]
+    least: float
+    most: float
+    unit: str
+    fix: str
+
+    def check(self, recording: Recording) -> None:
+        """Raise `InputError` outside of the limits."""
+        for field in self.fields:
+            measured = self.measure(recording, field)
+            value, note = measured if isinstance(measured, tuple) else (measured, "")
+            if self.least <= value <= self.most:
+                continue
+            attribute = "attribute " if field in LIMITS else ""
+            raise InputError(
+                f"{self.quantity} = {value:.6g} {self.unit}".strip()
+                + f"{note}, {_span(self.least, self.most)} {self.unit}".rstrip()
+                + " allowed",
+                where=f"{recording.path}: {attribute}{field}",
+                fix=self.fix,
+            )
 
 
 def check_values(recording: Recording) -> None:
     """Raise `InputError` at the first value that no simulator could use."""
-    _check_time(recording)
-    _check_numbers(recording)
-    _check_sizes(recording)
-    _check_gripper(recording)
-    _check_inclination(recording)
-    _check_scene(recording)
-
-
-def _check_time(recording: Recording) -> None:
-    time, where = recording.time, f"{recording.path}: time"
-    if len(time) < MIN_SAMPLES:
-        raise InputError(
-            f"{len(time)} samples", where=where, fix=f"record at least {MIN_SAMPLES} samples"
-        )
-    if not np.isfinite(time).all():
-        at = int(np.flatnonzero(~np.isfinite(time))[0])
-        raise InputError(f"time[{at}] = {time[at]}", where=where, fix="every sample needs a time")
-    step = np.diff(time)
-    if (step <= 0).any():
-        at = int(np.flatnonzero(step <= 0)[0]) + 1
-        raise InputError(
-            f"time[{at}] = {time[at]:g} s does not follow time[{at - 1}] = {time[at - 1]:g} s",
-            where=where,
-            fix="times must increase: sort the samples and drop repeated ones",
-        )
-    if np.median(step) > MAX_INTERVAL:
-        raise InputError(
-            f"samples are {np.median(step):g} s apart, which looks like milliseconds",
-            where=where,
-            fix="convert the times to s",
-        )
-
-
-def _check_numbers(recording: Recording) -> None:
-    names = LENGTHS + DENSITIES + tuple(n for n in STICK_WEIGHT if n in recording.attrs)
-    for name in names:
+    for name, (least, most, unit) in LIMITS.items():
+        if name in STICK_WEIGHT and name not in recording.attrs:
+            continue
         value = recording.attrs[name]
-        if (
-            not isinstance(value, int | float)
-            or isinstance(value, bool)
-            or not np.isfinite(value)
-            or value <= 0
-        ):
+        size = value if isinstance(value, int | float) and not isinstance(value, bool) else np.nan
+        if not 0.0 < size or not least <= size <= most:
+            given = f"{size:g} {unit}" if size == value else " ".join(repr(value).split())
             raise InputError(
-                f"{' '.join(repr(value).split()):.80}",
+                f"{given:.80}, {_span(least, most)} {unit} allowed",
                 where=f"{recording.path}: attribute {name}",
-                fix="it must be a positive number, in SI units",
+                fix=f"give a positive number in {unit}, or measure it again",
             )
+    for rule in RULES:
+        rule.check(recording)
 
 
-def _check_sizes(recording: Recording) -> None:
-    attrs = recording.attrs
-    for name in LENGTHS:
-        least, most = SIZE_LIMITS[name]
-        if recording.number(name) > most:
-            raise InputError(
-                f"{attrs[name]} m looks like cm or mm: it may be {most:g} m at the most",
-                where=f"{recording.path}: attribute {name}",
-                fix="convert it to m",
-            )
-        if recording.number(name) < least:
-            raise InputError(
-                f"{attrs[name]} m is too small: it must be {least:g} m at least",
-                where=f"{recording.path}: attribute {name}",
-                fix="measure it again, in m",
-            )
-    if "stick_mass" in attrs and recording.number("stick_mass") > MAX_MASS:
-        raise InputError(
-            f"{attrs['stick_mass']} kg looks like grams",
-            where=f"{recording.path}: attribute stick_mass",
-            fix="convert it to kg",
-        )
-    if "stick_mass" in attrs:
-        volume = np.pi * recording.number("stick_radius") ** 2 * recording.number("stick_length")
-        if (density := recording.number("stick_mass") / volume) > MAX_STICK_DENSITY:
-            raise InputError(
-                f"{attrs['stick_mass']} kg looks like grams: it makes {density:.3g} kg/m3",
-                where=f"{recording.path}: attribute stick_mass",
-                fix="convert it to kg, or measure the stick again",
-            )
-    for name in (*DENSITIES, "stick_density"):
-        if name in attrs and not MIN_DENSITY <= recording.number(name) <= MAX_DENSITY:
-            raise InputError(
-                f"{attrs[name]} kg/m3 is no liquid's or stick's density",
-                where=f"{recording.path}: attribute {name}",
-                fix="give it in kg/m3 (water: 1000)",
-            )
-    for inner, outer in (("fill", "cup_height"), ("stick_radius", "cup_radius")):
-        if recording.number(inner) >= recording.number(outer):
-            raise InputError(
-                f"{attrs[inner]} m is not below {outer} = {attrs[outer]} m",
-                where=f"{recording.path}: attribute {inner}",
-                fix="measure both again, in m",
-            )
-
-
-def _check_gripper(recording: Recording) -> None:
-    for name, values in zip(AXES, recording.gripper.position.T, strict=True):
-        where = f"{recording.path}: {name}"
-        seen = ~np.isnan(values)
-        if np.abs(values[seen]).max(initial=0.0) > MAX_POSITION:
-            raise InputError(
-                f"reaches {np.abs(values[seen]).max():g} m, which looks like cm or mm",
-                where=where,
-                fix="convert the positions to m",
-            )
-        gap, start = longest_gap(recording.time, seen)
-        if gap > MAX_GRIPPER_GAP:
-            raise InputError(
-                f"no gripper position for {gap:.2f} s from {start:.2f} s on",
-                where=where,
-                fix=f"gaps up to {MAX_GRIPPER_GAP} s can be filled: cut the recording before it",
-            )
-    seen = np.isfinite(recording.gripper.position).all(axis=1)
-    way, time = recording.gripper.position[seen], recording.time[seen]
-    usual = np.median(np.linalg.norm(np.diff(way, axis=0), axis=1) / np.diff(time))
-    if usual > MAX_SPEED:
-        raise InputError(
-            f"the gripper moves at {usual:.3g} m/s, faster than any arm stirs",
-            where=f"{recording.path}: time",
-            fix="give times in s and positions in m",
-        )
+def _span(least: float, most: float) -> str:
+    if not np.isfinite(most):
+        return f"at least {least:g}"
+    return f"{least:g}" if least == most else f"{least:g} to {most:g}"
 
 
 def longest_gap(time: NDArray, seen: NDArray[np.bool_]) -> tuple[float, float]:
@@ -175,76 +129,231 @@ def longest_gap(time: NDArray, seen: NDArray[np.bool_]) -> tuple[float, float]:
     return float(gaps[at]), float(edges[at])
 
 
-def _check_inclination(recording: Recording) -> None:
-    for name, values in zip(PLANES, recording.inclination.T, strict=True):
-        where = f"{recording.path}: {name}"
-        seen = ~np.isnan(values)
-        if seen.mean() < MIN_SEEN:
-            raise InputError(
-                f"NaN in {len(seen) - seen.sum()} of {len(seen)} samples",
-                where=where,
-                fix=f"the stick must be seen in at least {MIN_SEEN:.0%} of them: record again",
-            )
-        gap, start = longest_gap(recording.time, seen)
-        if gap > MAX_UNSEEN_TIME:
-            raise InputError(
-                f"NaN for {gap:.2f} s from {start:.2f} s on",
-                where=where,
-                fix=f"gaps up to {MAX_UNSEEN_TIME} s can be skipped: cut the recording before it",
-            )
-    check_inclination_values(recording)
+def _repeated(recording: Recording, field: str) -> Measured:
+    stamps, counts = np.unique(recording.time, return_counts=True)
+    count, distinct = len(recording.time), len(stamps)
+    decimals = next((n for n in range(9) if np.array_equal(stamps.round(n), stamps)), 9)
+    first = f"{stamps[counts.argmax()]:.13g} s"
+    return count - distinct, (
+        f" ({count} stamps, {distinct} distinct, of {decimals} decimals; such as {first})"
+    )
 
 
-def check_hangs(recording: Recording) -> None:
-    """Buoyancy's moment about the pivot must stay below the weight's, or the stick floats up.
+def _shortest_step(recording: Recording, field: str) -> Measured:
+    step = np.diff(recording.time)
+    at = int(step.argmin())
+    before, after = recording.time[at : at + 2]
+    return float(step[at]), f" from time[{at}] = {before:.13g} s to time[{at + 1}] = {after:.13g} s"
 
-    Raises:
-        InputError: It floats.
+
+def _usual_step(recording: Recording, field: str) -> Measured:
+    return float(np.median(np.diff(recording.time)))
+
+
+def clock_difference(time: NDArray, position: NDArray, inclination: NDArray) -> float:
+    """Of two logs of which one ends before the other begins [s]; 0 where they overlap.
+
+    Args:
+        time: Times of all samples [s], shape (T,).
+        position: Of the gripper [m], shape (T, 3); NaN where it is missing.
+        inclination: Of the stick [rad], shape (T, 2); likewise.
     """
+    arm = time[np.isfinite(position).any(axis=1)]
+    camera = time[np.isfinite(inclination).any(axis=1)]
+    if not len(arm) or not len(camera) or (arm[0] <= camera[-1] and camera[0] <= arm[-1]):
+        return 0.0
+    return float(abs(camera[0] - arm[0]))
+
+
+def _clock_difference(recording: Recording, field: str) -> Measured:
+    return clock_difference(*recording.gripper, recording.inclination)
+
+
+def _part(recording: Recording, field: str) -> Measured:
+    """Of an outer size."""
+    part, whole = recording.number(field), recording.number(OUTER[field])
+    return part / whole, f" of {OUTER[field]} ({part:g} m of {whole:g} m)"
+
+
+def _made_density(recording: Recording, field: str) -> Measured:
+    """Of a stick that was weighed; 0 of one that was not."""
+    volume = np.pi * recording.number("stick_radius") ** 2 * recording.number("stick_length")
+    mass = float(recording.attrs.get("stick_mass", 0.0))
+    return mass / volume, f" (of {mass:g} kg)"
+
+
+def _largest(recording: Recording, field: str) -> Measured:
+    values = recording.values(field)
+    return float(np.abs(values[~np.isnan(values)]).max(initial=0.0))
+
+
+def _gap(recording: Recording, field: str) -> Measured:
+    duration, start = longest_gap(recording.time, ~np.isnan(recording.values(field)))
+    return duration, f" from {start:.2f} s on"
+
+
+def _usual_speed(recording: Recording, field: str) -> Measured:
+    seen = np.isfinite(recording.gripper.position).all(axis=1)
+    way, time = recording.gripper.position[seen], recording.time[seen]
+    return float(np.median(np.linalg.norm(np.diff(way, axis=0), axis=1) / np.diff(time)))
+
+
+def _seen(recording: Recording, field: str) -> Measured:
+    missing = np.isnan(recording.values(field))
+    return 1.0 - missing.mean(), f" (NaN in {missing.sum()} of {len(missing)})"
+
+
+def _torn(recording: Recording, field: str) -> Measured:
+    """Samples that jump out and back; a few of them are missing already."""
+    torn = np.any([torn_values(recording.values(name), JUMPS[name]) for name in JUMPS], axis=0)
+    first = int(torn.argmax())
+    return int(torn.sum()), (
+        f" of {len(torn)}, the first is sample {first} at {recording.time[first]:.10g} s"
+    )
+
+
+def _frozen(recording: Recording, field: str) -> tuple[float, float, str]:
+    """Time of one and the same number while the gripper moves: longest [s], and share of all."""
+    values, time, position = recording.values(field), *recording.gripper
+    seen = np.isfinite(values) & np.isfinite(position).all(axis=1)
+    step = np.diff(time[seen])
+    way = np.linalg.norm(np.diff(position[seen], axis=0), axis=1)
+    moving = way > MIN_SPEED_SHARE * float(np.quantile(way / step, 0.9)) * step
+    same = np.diff(values[seen]) == 0.0
+    if not (moving & same).any():
+        return 0.0, 0.0, ""
+    runs = np.cumsum(~same)[same]  # intervals without change, by what they follow
+    _, starts, run = np.unique(runs, return_index=True, return_inverse=True)
+    lasts = np.bincount(run, weights=np.where(moving, step, 0.0)[same])
+    at = np.flatnonzero(same)[starts[int(lasts.argmax())]]
+    note = f" at {float(values[seen][at]):g} rad from {time[seen][at]:.2f} s on"
+    share = lasts[lasts > MIN_FROZEN_TIME].sum() / step[moving].sum()
+    return float(lasts.max()), float(share), note
+
+
+def _frozen_time(recording: Recording, field: str) -> Measured:
+    longest, _, note = _frozen(recording, field)
+    return longest, note
+
+
+def _frozen_share(recording: Recording, field: str) -> Measured:
+    _, share, note = _frozen(recording, field)
+    return share, note
+
+
+def _noise_deg(recording: Recording, field: str) -> Measured:
+    values = recording.values(field)
+    noise = noise_of(values)
+    return float(np.degrees(noise)) if noise > MAX_NOISE_SHARE * np.nanstd(values) else 0.0
+
+
+def _beyond_rim(recording: Recording, field: str) -> Measured:
+    """Share of samples in which the stick leans further than the rim of its cup lets it."""
+    above = float(np.nanmin(recording.gripper.position[:, 2])) - recording.number("cup_height")
+    if above <= 0.0:
+        return 0.0
+    most = np.arctan2(2.0 * recording.number("cup_radius"), above)
+    values = recording.values(field)
+    size = np.abs(values[np.isfinite(values)])
+    note = f" (up to {size.max():.3g} rad, where the rim stops the stick at {most:.2g} rad)"
+    return float((size > most + RIM_MARGIN).mean()), note
+
+
+def _lean_deg(recording: Recording, field: str) -> Measured:
+    """How far the stick leans [deg] behind a gripper that is fast; infinite where it is slow."""
+    known = np.isfinite(recording.gripper.position).all(axis=1)
+    time, position = recording.time[known], recording.gripper.position[known]
+    apart = np.searchsorted(time, time[0] + SPEED_TIME)  # samples; so far apart noise is no speed
+    way = np.linalg.norm(position[apart:] - position[:-apart], axis=1)
+    speed = way / (time[apart:] - time[:-apart])
+    fast = float(np.quantile(speed, 0.9)) if len(speed) else 0.0
+    leans = [np.abs(plane - np.nanmedian(plane)) for plane in recording.inclination.T]
+    lean = max(float(np.degrees(np.nanquantile(one, 0.99))) for one in leans)
+    return np.inf if fast < MIN_FAST else lean, f" while the gripper moves at {fast:.2g} m/s"
+
+
+def _room(recording: Recording, field: str) -> Measured:
+    """Between the stick at its pivot and the wall of the cup."""
+    x, y, _ = recording.gripper.position.T
+    radius, cup = float(np.nanmax(np.hypot(x, y))), recording.number("cup_radius")
+    note = f" (the gripper goes {radius:g} m from the axis, cup_radius is {cup:g} m)"
+    return cup - recording.number("stick_radius") - radius, note
+
+
+def _travel(recording: Recording, field: str) -> Measured:
+    path = recording.gripper.position[:, :2]
+    return float((np.nanmax(path, axis=0) - np.nanmin(path, axis=0)).max())
+
+
+def _lowest_tip(recording: Recording) -> float:
+    return float(np.nanmin(recording.values("z"))) - recording.number("stick_length")
+
+
+def _above_floor(recording: Recording, field: str) -> Measured:
+    return _lowest_tip(recording)
+
+
+def _depth(recording: Recording, field: str) -> Measured:
+    """Of the tip in the liquid, at its lowest."""
+    tip, fill = _lowest_tip(recording), recording.number("fill")
+    return fill - tip, f" (the tip is {tip:g} m above the floor, the liquid is {fill:g} m deep)"
+
+
+def _buoyancy(recording: Recording, field: str) -> Measured:
+    """Moment of buoyancy about the pivot over that of the weight."""
     from ..models import StirSetup
 
     if above_liquid(recording) >= 0.0:
-        return  # nothing lifts it there, and `check_start` refuses it
+        return 0.0  # nothing lifts it there, and `check_start` refuses it
     setup = StirSetup.from_recording(recording)
     stick, wet, mass = setup.stick, setup.submerged, setup.stick.mass
     displaced = recording.number("liquid_density") * np.pi * stick.radius**2 * wet
     lifted = displaced * (stick.length - wet / 2)
-    if lifted >= mass * stick.length / 2:
-        raise InputError(
-            f"a stick of {1000 * mass:.3g} g floats up in this liquid",
-            where=f"{recording.path}: attribute {' or '.join(STICK_WEIGHT)}",
-            fix="weigh the stick again; it must hang",
-        )
+    return lifted / (mass * stick.length / 2), f" (a stick of {1000 * mass:.3g} g floats up)"
 
 
-def _check_scene(recording: Recording) -> None:
-    cup, fill = recording.number("cup_radius"), recording.number("fill")
-    x, y, z = recording.gripper.position.T
-    radius = float(np.nanmax(np.hypot(x, y)))
-    if radius + recording.number("stick_radius") > cup:
-        raise InputError(
-            f"the gripper goes {radius:g} m from the cup's axis and leaves the cup"
-            f" (cup_radius = {cup:g} m)",
-            where=f"{recording.path}: x, y",
-            fix="the origin must lie on the cup's axis: shift x and y, or correct cup_radius",
-        )
-    if max(np.ptp(values[np.isfinite(values)]) for values in (x, y)) < MIN_TRAVEL:
-        raise InputError(
-            f"the gripper moves less than {MIN_TRAVEL:g} m",
-            where=f"{recording.path}: x, y",
-            fix="record a stir, or convert the positions to m",
-        )
-    tip = z - recording.number("stick_length")
-    if np.nanmin(tip) >= fill:
-        raise InputError(
-            f"the stick does not reach the liquid: its tip stays {np.nanmin(tip):g} m above the"
-            f" floor, the liquid is {fill:g} m deep",
-            where=f"{recording.path}: z, stick_length, fill",
-            fix="z counts from the cup's floor: correct z, stick_length or fill",
-        )
-    if np.nanmin(tip) < 0:
-        raise InputError(
-            f"the stick goes through the floor: its tip comes to {np.nanmin(tip):g} m",
-            where=f"{recording.path}: z, stick_length",
-            fix="z counts from the cup's floor: correct z or stick_length",
-        )
+INF, BELOW_1 = np.inf, float(np.nextafter(1.0, 0.0))
+TIME, WEIGHT = ("time",), (" or ".join(STICK_WEIGHT),)
+XY, ALL, TIP = ("x, y",), (", ".join(JUMPS),), ("z, stick_length",)
+LEANS = (", ".join(PLANES),)
+MEASURE, AGAIN = "measure both again, in m", "look at what was measured, and record again"
+MASS = "give the mass in kg, or measure the stick again"
+STILL = "mark samples of a camera that stood still by NaN, or record again"
+CLOCKS = "shift the stamps of one log onto the other's clock"
+DECIMALS = "write times with more decimals, or import a table with `rate_hz` in its map"
+ANGLE = "give it in rad from the downward vertical, and NaN where the stick was not seen"
+ONCE = "give it in rad: convert degrees once only"
+RIM = "give it in rad, or measure cup_radius, cup_height and z again"
+FLOOR = "z counts from the cup's floor: correct z, stick_length or fill"
+AXIS = "shift x and y to the cup's axis, or correct cup_radius"
+CUT = "cut the recording before it"
+FROZEN = "of one number while the gripper moves"
+
+RULES = (
+    Rule(TIME, "number of samples", lambda r, _: len(r.time), 10, INF, "", "record more"),
+    Rule(TIME, "repeated stamps", _repeated, 0, 0, "", DECIMALS),
+    Rule(TIME, "shortest step", _shortest_step, 1e-9, INF, "s", "sort the samples by time"),
+    Rule(TIME, "usual step", _usual_step, 0, 1, "s", "give times in s"),
+    Rule(("stick_mass",), "density", _made_density, 0, 25e3, "kg/m3", MASS),
+    Rule(tuple(OUTER), "part", _part, 0, BELOW_1, "", MEASURE),
+    Rule(TIME, "difference of arm's and cameras' clocks", _clock_difference, 0, 0, "s", CLOCKS),
+    Rule(AXES, "largest position", _largest, 0, 2, "m", "give positions in m"),
+    Rule(AXES, "longest time without a position", _gap, 0, MAX_GRIPPER_GAP, "s", CUT),
+    Rule(TIME, "usual speed", _usual_speed, 0, 1, "m/s", "give times in s and positions in m"),
+    Rule(
+        PLANES, "share of samples with the stick in sight", _seen, MIN_SEEN, 1, "", "record again"
+    ),
+    Rule(PLANES, "longest time without an inclination", _gap, 0, 0.5, "s", CUT),
+    Rule(PLANES, "largest inclination", _largest, 0, np.pi / 2, "rad", ANGLE),
+    Rule(ALL, "samples that jump out and back", _torn, 0, 0, "", AGAIN),
+    Rule(PLANES, f"longest time {FROZEN}", _frozen_time, 0, 1, "s", STILL),
+    Rule(PLANES, f"share of the time {FROZEN}", _frozen_share, 0, 0.25, "", STILL),
+    Rule(PLANES, "noise from sample to sample", _noise_deg, 0, 3, "deg", AGAIN),
+    Rule(PLANES, "share of samples beyond the cup's rim", _beyond_rim, 0, 0.02, "", RIM),
+    Rule(LEANS, "largest inclination", _lean_deg, 0.2, INF, "deg", ONCE),
+    Rule(XY, "room between stick and wall", _room, 0, INF, "m", AXIS),
+    Rule(XY, "travel", _travel, 1e-3, INF, "m", "record a stir, in m"),
+    Rule(TIP, "depth of the stick in the liquid", _depth, 1e-6, INF, "m", FLOOR),
+    Rule(TIP, "height of the tip above the floor", _above_floor, 0, INF, "m", FLOOR),
+    Rule(WEIGHT, "buoyancy / weight", _buoyancy, 0, BELOW_1, "", "weigh the stick; it must hang"),
+)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import Argument, InputError
-from .checks import SIZE_LIMITS
+from .checks import LIMITS
 from .toml_file import read_toml
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def _check_pourable(cups: "Cups", where: str) -> None:
     Raises:
         InputError: A size is a slip of the unit, or nothing flows over the lip.
     """
-    radii, heights = SIZE_LIMITS["cup_radius"], SIZE_LIMITS["cup_height"]
+    radii, heights = LIMITS["cup_radius"][:2], LIMITS["cup_height"][:2]
     sizes = {
         "source.radius": (cups.source.radius, *radii),
         "receiver.radius": (cups.receiver.radius, *radii),

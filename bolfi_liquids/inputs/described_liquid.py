@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field
 
 from ..errors import Argument, InputError
-from ..numerals import parse_number
 from .settings import Particles, Seed, checked
+from .table import parse_number
 
 if TYPE_CHECKING:
     from ..models import Liquid
@@ -97,23 +97,16 @@ def read_effects(given: Iterable[str], scene: str) -> dict[str, float]:
     Raises:
         InputError: One is of another form or given twice, or see `check_effects`.
     """
-    from ..models import EFFECTS
-
     read: dict[str, float] = {}
     for text in given:
         name, _, value = (part.strip() for part in text.partition("="))
-        where = f"--effect {text}"
+        if name in read:
+            raise InputError("given twice", where=f"--effect {text}", fix="give it once")
         try:
             number = parse_number(value)
         except ValueError:
             number = math.nan
-        if name not in EFFECTS:
-            raise _unknown(where)
-        if not math.isfinite(number):
-            raise _out_of_range(name, value, where)
-        if name in read:
-            raise InputError("given twice", where=where, fix="give it once")
-        read |= check_effects({name: number}, scene)
+        read[name] = _coefficient(name, number, value, scene)
     return read
 
 
@@ -124,40 +117,31 @@ def check_effects(effects: Mapping[str, float] | None, scene: str) -> dict[str, 
         InputError: They are no numbers by name, or one is unknown, out of its range, or acts in
             the other scene only.
     """
-    from ..models import EFFECTS
-
     if effects is None:
         return {}
     if not isinstance(effects, Mapping):
         raise InputError(
             f"{effects!r:.80}", where=Argument("effects"), fix="give coefficients by name"
         )
-    for name, value in effects.items():
-        value = number_of(value, f"--effect {name}")
-        where = f"--effect {name}={value:g}"
-        if name not in EFFECTS:
-            raise _unknown(where)
-        effect = EFFECTS[name]
-        if not effect.lowest <= value <= effect.highest:
-            raise _out_of_range(name, value, where)
-        if scene not in effect.scenes:
-            raise InputError(f"does not act in a {scene}", where=where, fix="leave it out")
-    return dict(effects)
+    numbers = {name: number_of(value, f"--effect {name}") for name, value in effects.items()}
+    return {name: _coefficient(name, one, f"{one:g}", scene) for name, one in numbers.items()}
 
 
-def _unknown(where: str) -> InputError:
+def _coefficient(name: str, value: float, given: str, scene: str) -> float:
+    """`value`, if an effect takes it as its coefficient; NaN where `given` is no number."""
     from ..models import EFFECTS
 
-    return InputError("unknown", where=where, fix=f"there are {', '.join(sorted(EFFECTS))}")
-
-
-def _out_of_range(name: str, value: str | float, where: str) -> InputError:
-    from ..models import EFFECTS
-
+    where = f"--effect {name}={given}"
+    if name not in EFFECTS:
+        raise InputError("unknown", where=where, fix=f"there are {', '.join(sorted(EFFECTS))}")
     effect = EFFECTS[name]
-    span = f"{effect.lowest:g} to {effect.highest:g}"
-    return InputError(
-        f"{value!r} is no coefficient of it",
-        where=where,
-        fix=f"give {name}=NUMBER, from {span} in the unit {effect.unit}",
-    )
+    if not effect.lowest <= value <= effect.highest:
+        raise InputError(
+            f"{given!r:.80} is no coefficient of it",
+            where=where,
+            fix=f"give {name}=NUMBER, from {effect.lowest:g} to {effect.highest:g} in the unit "
+            f"{effect.unit}",
+        )
+    if scene not in effect.scenes:
+        raise InputError(f"does not act in a {scene}", where=where, fix="leave it out")
+    return value

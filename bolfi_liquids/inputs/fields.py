@@ -53,11 +53,19 @@ def _check_variable(dataset: "Dataset", name: str, units: tuple[str, ...], path:
         raise InputError(
             f"has dimensions {variable.dims}", where=where, fix="it must have the dimension time"
         )
+    unit = str(variable.attrs.get("units", units[0]))
+    if " since " in unit:
+        raise InputError(
+            f"holds dates, {variable.dtype} in {unit!r}",
+            where=where,
+            fix=f"store the time since the first sample in {units[0]}, as float64",
+        )
     if variable.dtype.kind != "f":  # complex numbers lose a part, whole ones what they measured
         raise InputError(
-            f"holds {variable.dtype}, not decimal numbers", where=where, fix="store it as float64"
+            f"holds {variable.dtype} in {unit!r}, not decimal numbers",
+            where=where,
+            fix=f"store it in {units[0]}, as float64",
         )
-    unit = str(variable.attrs.get("units", units[0]))
     if unit not in units:
         raise InputError(
             f"has units {unit!r}",

@@ -42,6 +42,16 @@ MAX_TURN_ERRORS = 3.0
 """Standard errors by which a turn must differ from none."""
 
 
+CAUSES = {
+    (False, 2): f"the signs (`flip`) of {' and '.join(PLANES)}, or of x and y, are wrong",
+    (True, 0): f"the sign (`flip`) of {PLANES[1]}, or of y, is wrong",
+    (True, 1): "the planes are exchanged",
+    (True, 2): f"the sign (`flip`) of {PLANES[0]}, or of x, is wrong",
+    (True, 3): "the planes are exchanged, and their signs are wrong",
+}
+"""What is likely wrong, by whether the frame is mirrored, and its turn in quarters."""
+
+
 class FrameRotation(NamedTuple):
     """How the frame of the inclination lies to that of the positions.
 
@@ -56,50 +66,24 @@ class FrameRotation(NamedTuple):
     error_deg: float
     mirrored: bool
 
-    def __str__(self) -> str:
-        return f"{_whole(self.angle_deg)} +- {_whole(self.error_deg)} deg"
-
-
-def _whole(angle_deg: float) -> int:
-    """Without the sign that a format gives to a rounded zero."""
-    return round(angle_deg)
-
 
 def found_turn(recording: Recording) -> FrameRotation | None:
     """The turn of a recording's frame; None where its path does not tell it."""
-    pair = _pair(recording)
-    if pair is None:
+    path = recording.gripper.position[:, :2]
+    inclination = recording.inclination @ (1.0, 1j)
+    seen = np.isfinite(inclination)
+    travel = (np.nanmax(path, axis=0) - np.nanmin(path, axis=0)).max()
+    if travel < MIN_TRAVEL or seen.sum() < N_BLOCKS * MIN_SAMPLES_PER_BLOCK:
         return None
-    inclination, delayed = pair
+    delayed, inclination = _delayed(recording)[seen], inclination[seen]
     straight, mirrored = _fit(inclination, delayed), _fit(inclination.conj(), delayed)
     is_mirrored = mirrored.residual < MAX_RESIDUAL_RATIO * straight.residual
     best = mirrored if is_mirrored else straight
     if best.residual > MAX_RESIDUAL_RATIO * best.worst or best.followed < MIN_FOLLOWED:
         return None
-    seen = inclination.conj() if is_mirrored else inclination
+    followed = inclination.conj() if is_mirrored else inclination
     return FrameRotation(
-        float(np.degrees(best.angle)), _error_deg(seen, delayed, best.angle), is_mirrored
-    )
-
-
-def trailing(recording: Recording) -> tuple[float, ...]:
-    """Correlation of each plane's inclination with what the gripper has moved of late along it.
-
-    From -0.4 to -1 for a stick that trails. NaN where the gripper hardly moves that way.
-    """
-    pair = _pair(recording)
-    if pair is None:
-        return (np.nan, np.nan)
-    inclination, way = pair
-    moved = way[:, 0] - way.mean(axis=1)
-    return tuple(
-        float(np.corrcoef(angle, along)[0, 1])
-        if np.ptp(at) >= MIN_TRAVEL and np.ptp(angle) > 0.0
-        else np.nan
-        for angle, along, at in (
-            (np.real(inclination), np.real(moved), np.real(way[:, 0])),
-            (np.imag(inclination), np.imag(moved), np.imag(way[:, 0])),
-        )
+        float(np.degrees(best.angle)), _error_deg(followed, delayed, best.angle), is_mirrored
     )
 
 
@@ -116,56 +100,31 @@ def named_faults(recordings: Iterable[Recording]) -> tuple[str, ...]:
 def frame_faults(recording: Recording) -> Iterator[str]:
     """What is wrong with the frame of a recording; nothing where none is found."""
     turn = found_turn(recording)
-    if turn is None or not (turn.mirrored or _is_turned(turn)):
+    if turn is None:
         return
-    xz, yz = PLANES
-    quarters = round(turn.angle_deg / 90.0)
-    quarter = quarters % 4 if abs(turn.angle_deg - 90.0 * quarters) <= MAX_TURN_DEG else None
-    ahead = "the stick leans ahead of the gripper: its sign (`flip`) is wrong, or that of"
-    if not turn.mirrored and quarter == 2:
-        yield f"{xz}: {ahead} x; the same holds for {yz} and y (or add 180 to `yaw_deg`)"
-    elif not turn.mirrored:
-        yield (
-            f"the inclination is turned by {turn} against x and y: correct the axes, or add "
-            f"{_whole(turn.angle_deg)} to `yaw_deg` in the map of `bolfi-liquids import`, where "
-            "none is 0"
-        )
-    elif quarter == 0:
-        yield f"{yz}: {ahead} y"
-    elif quarter == 2:
-        yield f"{xz}: {ahead} x"
-    elif quarter is not None:
-        yield f"{xz}: the stick follows y more than x: the planes are exchanged"
-    else:
-        yield (
-            "x and y, or the planes, form a mirrored frame, which is turned as well "
-            f"({turn}): correct one sign (`flip`) first, and then `yaw_deg`"
-        )
+    angle, error = turn.angle_deg, turn.error_deg
+    if not turn.mirrored and abs(angle) <= max(MAX_TURN_DEG, MAX_TURN_ERRORS * error):
+        return
+    quarters = round(angle / 90.0)
+    near = abs(angle - 90.0 * quarters) <= MAX_TURN_DEG
+    cause = CAUSES.get((turn.mirrored, quarters % 4)) if near else None
+    mirrored = "mirrored and " if turn.mirrored else ""
+    flip = f" after `flip` of {PLANES[1]}" if turn.mirrored else ""
+    yield (
+        f"the inclination is {mirrored}turned by {round(angle)} +- {round(error)} deg against x "
+        f"and y: {cause or f'add {round(angle)} to `yaw_deg`{flip}'}; "
+        "correct the map of `bolfi-liquids import`, or the axes of the rig"
+    )
 
 
-def _is_turned(turn: FrameRotation) -> bool:
-    return abs(turn.angle_deg) > max(MAX_TURN_DEG, MAX_TURN_ERRORS * turn.error_deg)
-
-
-def _pair(recording: Recording) -> tuple[NDArray, NDArray] | None:
-    """Inclination (n,) and positions at each delay before it (n, delays); None where too few."""
-    time, position = recording.time, recording.gripper.position[:, :2]
-    if max(np.ptp(axis[np.isfinite(axis)]) for axis in position.T) < MIN_TRAVEL:
-        return None
-    way = np.empty((len(time), len(DELAYS)), dtype=complex)
-    for at, delay in enumerate(DELAYS):
-        x, y = (_at(time - delay, time, axis) for axis in position.T)
-        way[:, at] = x + 1j * y
-    inclination = recording.inclination[:, 0] + 1j * recording.inclination[:, 1]
-    seen = np.isfinite(inclination)
-    if seen.sum() < N_BLOCKS * MIN_SAMPLES_PER_BLOCK:
-        return None
-    return inclination[seen], way[seen]
-
-
-def _at(wanted: NDArray, time: NDArray, values: NDArray) -> NDArray:
-    known = np.isfinite(values)
-    return np.interp(wanted, time[known], values[known])
+def _delayed(recording: Recording) -> NDArray[np.complex128]:
+    """The gripper's x + i y at each sample, and each delay before it, shape (T, delays)."""
+    time, way = recording.time, 0.0
+    for axis, factor in zip(recording.gripper.position.T[:2], (1.0, 1j), strict=True):
+        known = np.isfinite(axis)
+        before = [np.interp(time - delay, time[known], axis[known]) for delay in DELAYS]
+        way = way + factor * np.stack(before, axis=-1)
+    return np.asarray(way)
 
 
 class _RotationFit(NamedTuple):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from ..files import existing_file
-from .checks import check_hangs, check_values
+from .checks import check_values
 from .fields import check_fields
 from .recording import Recording, as_recording
 from .start import check_start
@@ -51,7 +51,6 @@ def check_recording(recording: Recording) -> None:
     """Raise `InputError` unless a recording can be simulated; see `open_recording`."""
     check_values(recording)
     check_start(recording)
-    check_hangs(recording)
 
 
 def read_recording(path: str | Path) -> Recording:

@@ -20,13 +20,18 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-ACTIONS = ("angular_velocity_deg_s", "distance_cm")
-AMOUNTS = ("spilled", "received", "retained")
-ACTION_RANGES = (1.0, 1000.0), (-20.0, 50.0)  # of the actions, in their units
+RANGES = {
+    "angular_velocity_deg_s": (1.0, 1000.0),
+    "distance_cm": (-20.0, 50.0),
+    "spilled": (0.0, np.inf),
+    "received": (0.0, np.inf),
+    "retained": (0.0, np.inf),
+}
+"""Columns of a table and their limits: what a robot can do, and amounts in any one unit."""
+
+ANGULAR_VELOCITY, DISTANCE, *AMOUNTS = RANGES
 LIQUID = "liquid"
 MIN_POURS = 3  # from which anything can be learned
-WORDS_FOR_A_NUMBER = ("id", "no", "nr", "num", "number", "index", "idx", "code", "label", "type")
-FIX_LINE = "mend or remove the line"
 MAX_TIMES_BEYOND = 4.0  # that a pour may be faster or slower than the cups' range
 MAX_TIMES_TOTAL = 10.0  # that a pour may be more or less than the usual one of its table
 ROUNDING = 1e-9  # relative, of an action at an end of the cups' range
@@ -96,13 +101,11 @@ def open_pours(path: str | Path, liquid: str | None = None, *, told: bool = True
             and value.
     """
     table = read_table(path)
-    needed = (*ACTIONS, *AMOUNTS)
-    _check_liquid_named(table)
-    if missing := [name for name in needed if not table.has(name)]:
+    if missing := [name for name in RANGES if not table.has(name)]:
         raise InputError(
             f"has no column {', '.join(missing)}",
             where=str(table.path),
-            fix=f"give a column for each of {', '.join(needed)}",
+            fix=f"give a column for each of {', '.join(RANGES)}",
         )
     table, liquid = _of_liquid(table, liquid)
     if len(table.lines) < MIN_POURS:
@@ -111,25 +114,18 @@ def open_pours(path: str | Path, liquid: str | None = None, *, told: bool = True
             where=str(table.path),
             fix=f"give at least {MIN_POURS} of them",
         )
-    actions = np.stack([_finite(table, name) for name in ACTIONS], axis=1)
-    _check_actions(table, actions)
-    amounts = np.stack([_amounts(table, name) for name in AMOUNTS], axis=1)
+    values = {name: _within(table, name, *ends) for name, ends in RANGES.items()}
+    amounts = np.stack([values[name] for name in AMOUNTS], axis=1)
     total = amounts.sum(axis=1, keepdims=True)
-    if (total <= 0.0).any():
-        raise InputError(
-            "spilled, received and retained are all 0",
-            where=f"{table.path}: line {table.lines[int(np.argmin(total))]}",
-            fix="weigh what was poured",
-        )
     _check_totals(table, total[:, 0])
-    unused = table.others((*needed, LIQUID))
+    unused = table.others((*RANGES, LIQUID))
     if unused and told:
         logger.warning("%s: columns not used: %s", table.path, ", ".join(unused))
     return PourTable(
         path=table.path,
         liquid=liquid,
-        angular_velocity=np.radians(actions[:, 0]),
-        distance=actions[:, 1] / 100.0,
+        angular_velocity=np.radians(values[ANGULAR_VELOCITY]),
+        distance=values[DISTANCE] / 100.0,
         fractions=amounts / total,
         lines=np.asarray(table.lines),
         hash=hashlib.sha256(table.path.read_bytes()).hexdigest(),
@@ -176,20 +172,21 @@ def table_and_cups(
 
 
 def check_scene(table: PourTable, cups: "Cups") -> None:
-    """Refuse pours that cannot have been made with these cups, and guess at their unit.
+    """Refuse pours that cannot have been made with these cups.
 
     Raises:
-        InputError: The first of them; or all distances are so short that they must be in m.
+        InputError: The first of them; or all distances are too short for these cups.
     """
     for rate, distance in zip(table.angular_velocity, table.distance, strict=True):
-        check_rate(float(rate), cups, f"{table.path}: {ACTIONS[0]}")
-        check_distance(float(distance), cups, f"{table.path}: {ACTIONS[1]}")
+        check_rate(float(rate), cups, f"{table.path}: {ANGULAR_VELOCITY}")
+        check_distance(float(distance), cups, f"{table.path}: {DISTANCE}")
     longest = float(np.abs(table.distance).max())
-    if 0.0 < longest < MIN_DISTANCE_SHARE * max(map(abs, cups.distance_range)):
+    least = MIN_DISTANCE_SHARE * max(map(abs, cups.distance_range))
+    if 0.0 < longest < least:
         raise InputError(
-            f"none is longer than {100.0 * longest:g} cm, which looks like m",
-            where=f"{table.path}: {ACTIONS[1]}",
-            fix="convert the distances to cm",
+            f"the longest is {100.0 * longest:g} cm, at least {100.0 * least:g} cm is expected",
+            where=f"{table.path}: {DISTANCE}",
+            fix="give the distances in cm",
         )
 
 
@@ -199,10 +196,8 @@ def check_distance(distance: float, cups: "Cups", where: str) -> None:
     beyond = max(high - low, 2.0 * cups.receiver.radius)
     if low - beyond <= distance <= high + beyond:
         return
-    looks = ", which looks like mm" if low <= distance / 10.0 <= high else ""
     raise InputError(
-        f"{100.0 * distance:g} cm{looks}; the cups stand {100.0 * low:g} to {100.0 * high:g} cm "
-        "apart",
+        f"{100.0 * distance:g} cm; the cups stand {100.0 * low:g} to {100.0 * high:g} cm apart",
         where=where,
         fix="give the distance from the lip to the receiver's axis in cm, or the cups that were "
         "poured with",
@@ -215,54 +210,22 @@ def check_rate(rate: float, cups: "Cups", where: str) -> None:
     if low / MAX_TIMES_BEYOND <= rate <= high * MAX_TIMES_BEYOND:
         return
     given, slow, fast = np.degrees([rate, low, high])
-    looks = ", which looks like rad/s" if low <= given <= high else ""
     raise InputError(
-        f"{given:g} deg/s{looks}; the cups are turned at {slow:g} to {fast:g} deg/s",
+        f"{given:g} deg/s; the cups are turned at {slow:g} to {fast:g} deg/s",
         where=where,
         fix="give the angular velocity in deg/s, or the cups that were poured with",
     )
 
 
-def _check_liquid_named(table: Table) -> None:
-    """Refuse a table whose column of liquids would be taken for a remark."""
-    if table.has(LIQUID):
-        return
-    others = table.others({*ACTIONS, *AMOUNTS})
-    near = [
-        name
-        for name, cells in zip(table.header, table.cells.T, strict=True)
-        if name in others and any(cells) and _tells_liquids(name, cells)
-    ]
-    if near:
-        raise InputError(
-            f"column {near[0]!r} is not known; is it {LIQUID!r}?",
-            where=f"{table.path}: header",
-            fix=f"name it {LIQUID!r} where it says of which liquid a pour is, else otherwise",
-        )
-
-
-def _tells_liquids(name: str, cells: NDArray) -> bool:
-    """Whether a column looks like that of the liquids, which may be named or numbered.
-
-    With numbers, `liquid_mass_g` is a remark, while `liquids`, `liquid_id` and `Fluid No.` are not.
-    """
-    words = [word for word in re.split(r"[\W\d_]+", name.casefold()) if word]
-    named = [word for word in words if LIQUID in word or get_close_matches(LIQUID, [word], 1, 0.7)]
-    if not all(map(is_number, filter(None, cells))):
-        return bool(named)
-    return bool(named) and all(word in named or word in WORDS_FOR_A_NUMBER for word in words)
-
-
 def _of_liquid(table: Table, liquid: str | None) -> tuple[Table, str]:
-    """The rows of one liquid, and its name."""
+    """The rows of one liquid, and its name; the whole table where no column names liquids."""
     if not table.has(LIQUID):
-        return table, ""  # the whole file is of one liquid, whatever its name
+        _check_remarks(table)
+        return table, ""
     of = table.column(LIQUID)
     names = sorted(set(of))
-    if liquid is None and len(names) <= 1:
+    if names == [""] or (liquid is None and len(names) <= 1):
         return table, "".join(names)
-    if names == [""]:
-        return table, ""
     if liquid is None or liquid not in names:
         raise InputError(
             f"holds pours of {', '.join(names)}" + (f", not of {liquid}" if liquid else ""),
@@ -272,27 +235,32 @@ def _of_liquid(table: Table, liquid: str | None) -> tuple[Table, str]:
     return replace(table, lines=table.lines[of == liquid], cells=table.cells[of == liquid]), liquid
 
 
-def _check_actions(table: Table, actions: NDArray) -> None:
-    """Raise InputError for what no robot could do."""
-    for line, row in zip(table.lines, actions, strict=True):
-        for name, value, (least, most) in zip(ACTIONS, row, ACTION_RANGES, strict=True):
-            if not least <= value <= most:
-                raise InputError(
-                    f"{value:g} is not between {least:g} and {most:g}",
-                    where=table.where(line, name),
-                    fix=FIX_LINE,
-                )
+def _check_remarks(table: Table) -> None:
+    """Refuse a liquid column that would be ignored: a name like it over no measurement."""
+    others = table.others(RANGES)
+    for name, cells in zip(table.header, table.cells.T, strict=True):
+        held = [cell for cell in cells if cell]
+        if name not in others or not held or all("." in cell and is_number(cell) for cell in held):
+            continue
+        words = [word for word in re.split(r"[\W\d_]+", name.casefold()) if word]
+        if get_close_matches(LIQUID, words, 1, 0.7) or any(LIQUID in word for word in words):
+            raise InputError(
+                f"column {name!r} is not known; is it {LIQUID!r}?",
+                where=f"{table.path}: header",
+                fix=f"name it {LIQUID!r} where it says of which liquid a pour is, else otherwise",
+            )
 
 
-def _finite(table: Table, name: str) -> NDArray[np.float64]:
-    """Numbers of a column, none of which may be missing."""
+def _within(table: Table, name: str, least: float, most: float) -> NDArray[np.float64]:
+    """Numbers of a column, none of which may be missing or outside of its limits."""
     values = table.numbers(name)
-    if not np.isfinite(values).all():
-        at = int(np.flatnonzero(~np.isfinite(values))[0])
+    wrong = ~((values >= least) & (values <= most))
+    if wrong.any():
+        at = int(wrong.argmax())
         raise InputError(
-            f"{table.column(name)[at]!r} is no number",
+            f"{table.column(name)[at]!r} is not between {least:g} and {most:g}",
             where=table.where(table.lines[at], name),
-            fix=FIX_LINE,
+            fix="correct or remove the line",
         )
     return values
 
@@ -300,24 +268,13 @@ def _finite(table: Table, name: str) -> NDArray[np.float64]:
 def _check_totals(table: Table, total: NDArray) -> None:
     """Refuse pours of quite another amount than the others: a slip of the pen or of the unit."""
     usual = float(np.median(total))
-    wrong = (total > MAX_TIMES_TOTAL * usual) | (total * MAX_TIMES_TOTAL < usual)
+    least, most = usual / MAX_TIMES_TOTAL, usual * MAX_TIMES_TOTAL
+    wrong = (total <= 0.0) | (total < least) | (total > most)
     if wrong.any():
-        at = int(np.flatnonzero(wrong)[0])
+        at = int(wrong.argmax())
         raise InputError(
-            f"spilled, received and retained are {total[at]:g} in all, where the pours of this "
-            f"table are usually {usual:g}",
+            f"{', '.join(AMOUNTS)} are {total[at]:g} in all, where the pours of this table are "
+            f"usually {usual:g}, {least:g} to {most:g} allowed",
             where=f"{table.path}: line {table.lines[at]}",
-            fix="give all in one unit",
+            fix="give all in one unit, and weigh what was poured",
         )
-
-
-def _amounts(table: Table, name: str) -> NDArray[np.float64]:
-    values = _finite(table, name)
-    if (values < 0.0).any():
-        at = int(np.flatnonzero(values < 0.0)[0])
-        raise InputError(
-            f"{table.column(name)[at]} is negative",
-            where=table.where(table.lines[at], name),
-            fix="give masses, volumes or counts",
-        )
-    return values

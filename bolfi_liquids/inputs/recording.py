@@ -25,6 +25,15 @@ SUBJECTS = {
 }
 """Attributes of a recording's file, by what they are of."""
 
+JUMPS = {**dict.fromkeys(AXES, 0.05), **dict.fromkeys(PLANES, np.radians(30.0))}
+"""By which a sample leaves both of its neighbours, which agree, if it is torn [m] or [rad].
+
+At 10 Hz that takes an acceleration of 10 m/s2, or a swing of more than 90 degrees.
+"""
+
+MAX_TORN_SHARE = 0.01
+"""Of torn samples that count as missing; one always may."""
+
 ATTRIBUTE_UNITS = {"stick_mass": "kg", "stick_density": "kg/m³", "liquid_density": "kg/m³"}
 
 
@@ -47,6 +56,7 @@ class Recording:
         attrs: The file's attributes: geometry [m], densities [kg/m3], `source`, `status`.
         path: The file.
         hash: SHA-256 of the file's bytes, in hexadecimal.
+        torn: A sentence for each torn value of the file, which is missing here.
     """
 
     time: NDArray[np.float64]
@@ -55,15 +65,16 @@ class Recording:
     attrs: Mapping[str, float | str]
     path: Path
     hash: str
+    torn: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        told = "; ".join(f"{name} {value}" for name, value in self._rows().items())
+        told = "; ".join(f"{name} {value}" for name, value in self.subjects().items())
         return f"Recording({str(self.path)!r}: {told})"
 
     def _repr_html_(self) -> str:
-        return html_table("Recording", {"file": self.path, **self._rows()})
+        return html_table("Recording", {"file": self.path, **self.subjects()})
 
-    def _rows(self) -> dict[str, str]:
+    def subjects(self) -> dict[str, str]:
         """What it is of, by subject; without what the file does not say."""
         length = f"{self.time[-1] - self.time[0]:.1f} s" if len(self.time) else "0 s"
         parts = {
@@ -74,6 +85,11 @@ class Recording:
             "duration": f"{length} ({len(self.time)} samples)",
             **{subject: ", ".join(told) for subject, told in parts.items() if told},
         }
+
+    def values(self, name: str) -> NDArray[np.float64]:
+        """A variable of its file, with SI units, shape (T,)."""
+        columns = (self.time, *self.gripper.position.T, *self.inclination.T)
+        return dict(zip(UNITS, columns, strict=True))[name]
 
     def number(self, name: str) -> float:
         """A numeric attribute, in SI units."""
@@ -107,14 +123,17 @@ def _unpickled(values: dict[str, Any]) -> Recording:
     return Recording(**{**values, "attrs": MappingProxyType(values["attrs"])})
 
 
-def aborted_recordings(recordings: Iterable[Recording]) -> list[str]:
-    """A warning for each recording that something stopped."""
-    return [
-        f"{one.path}: aborted after {one.time[-1] - one.time[0]:.1f} s of stirring "
-        f"({one.attrs.get('reason') or 'no reason is told'}); a short stir says little"
-        for one in recordings
-        if one.attrs.get("status") == "aborted"
-    ]
+def recording_warnings(recordings: Iterable[Recording]) -> list[str]:
+    """A warning for each recording that something stopped, and for each torn value."""
+    warnings = []
+    for one in recordings:
+        if one.attrs.get("status") == "aborted":
+            warnings.append(
+                f"{one.path}: aborted after {one.time[-1] - one.time[0]:.1f} s of stirring "
+                f"({one.attrs.get('reason') or 'no reason is told'}); a short stir says little"
+            )
+        warnings += [f"{one.path}: {text}" for text in one.torn]
+    return warnings
 
 
 def recording_dataset(values: Mapping[str, NDArray], attrs: Mapping[str, float | str]) -> "Dataset":
@@ -139,24 +158,62 @@ def along_path(recording: Recording, inclination: NDArray) -> dict[str, NDArray]
 def as_recording(dataset: "Dataset", path: Path, content: bytes) -> Recording:
     """What the variables and attributes of a recording's file mean; nothing is checked.
 
+    A few torn values are missing in the recording, and named in its `torn`.
+
     Args:
         dataset: With the fields and units that `bolfi-liquids guide recordings` lists.
         path: The file that it was read from.
         content: Its bytes.
     """
 
-    def stack(names: tuple[str, ...]) -> NDArray[np.float64]:
-        return _frozen(np.stack([dataset[name].to_numpy() for name in names], axis=-1))
-
-    time = _frozen(dataset["time"].to_numpy())
+    values = {name: dataset[name].to_numpy() for name in UNITS}
+    torn = _without_torn(values)
+    time = _frozen(values["time"])
     return Recording(
         time=time,
-        gripper=Trajectory(time, stack(AXES)),
-        inclination=stack(PLANES),
+        gripper=Trajectory(time, _frozen(np.stack([values[name] for name in AXES], axis=-1))),
+        inclination=_frozen(np.stack([values[name] for name in PLANES], axis=-1)),
         attrs=MappingProxyType({str(k): _plain(v) for k, v in dataset.attrs.items()}),
         path=path,
         hash=hashlib.sha256(content).hexdigest(),
+        torn=torn,
     )
+
+
+def torn_values(values: NDArray, jump: float) -> NDArray[np.bool_]:
+    """Which values lie far from both of their neighbours, while these agree.
+
+    Args:
+        values: Shape (T,); NaN where one is missing, which has no neighbour.
+        jump: Smallest distance from the neighbours.
+
+    Returns:
+        Shape (T,).
+    """
+    torn = np.zeros(len(values), bool)
+    known = np.flatnonzero(np.isfinite(values))
+    before, value, after = (values[known[at : len(known) - 2 + at]] for at in range(3))
+    agree = np.abs(after - before) < 0.5 * jump
+    torn[known[1:-1]] = agree & (np.abs(value - before) > jump) & (np.abs(after - value) > jump)
+    return torn
+
+
+def _without_torn(values: dict[str, NDArray]) -> tuple[str, ...]:
+    """Replace torn values by NaN where they are few; a sentence for each."""
+    torn = {name: torn_values(values[name], jump) for name, jump in JUMPS.items()}
+    count = np.any(list(torn.values()), axis=0).sum()
+    if not 0 < count <= max(1.0, MAX_TORN_SHARE * len(values["time"])):
+        return ()
+    told = []
+    for name, at in torn.items():
+        unit = UNITS[name][0]
+        for sample in np.flatnonzero(at):
+            told.append(
+                f"{name}: {values[name][sample]:.6g} {unit} of sample {sample} "
+                f"({values['time'][sample]:.10g} s) jumps out and back, and counts as missing"
+            )
+        values[name] = np.where(at, np.nan, values[name])
+    return tuple(told)
 
 
 def _frozen(values: NDArray) -> NDArray[np.float64]:

@@ -1,28 +1,38 @@
-"""Tables that a person writes: text with a header and a row for each measurement."""
+"""Tables that a person writes: UTF-8 text with a header and a row for each measurement.
 
+A file that begins with the byte-order mark of UTF-16, as spreadsheets save "Unicode text", is read
+as such.
+
+The delimiter is `;` where the header holds one, else a tab where it holds one, else a comma. The
+decimal sign is a point. With `;` it is the comma as soon as a number has one. Thousands are not
+set apart. A workbook (.xlsx) is read where pandas finds a reader for it.
+"""
+
+import codecs
 import csv
-import io
+import math
 import re
-from collections.abc import Iterable, Sequence
+import zipfile
+from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import existing_file
-from ..numerals import has_decimals, may_have_thousands, parse_number
 
-if TYPE_CHECKING:
-    from pandas import DataFrame
-
-DELIMITERS = ",;\t|"
-NOT_TEXT = "\0"  # in no table, but in most other files
-TOLD_DELIMITER = re.compile("sep=(.)")  # how Excel is told, in the first line
 MISSING = ("", "nan", "na", "n/a", "null", "none", "-")
+NUMBERS = {
+    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII),
+    ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?", re.ASCII),
+}
+SAVE_AS_CSV = "save it as CSV in UTF-8"
+
+Row = tuple[int, list[str]]
+"""Line of a file, counted from 1, and its cells without blanks around them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +41,7 @@ class Table:
 
     Attributes:
         path: The file.
-        header: Names of the columns, without blanks around them.
+        header: Names of the columns.
         delimiter: Between two cells.
         decimal: In a number.
         lines: Line of the file that each row stands in, counted from 1, shape (rows,).
@@ -60,29 +70,48 @@ class Table:
         Raises:
             InputError: No column, or more than one, has this name, or a line ends before it.
         """
-        column = self.cells[:, self._position(name, fix)]
-        for line, cell, row in zip(self.lines, column, self.cells, strict=True):
-            if cell is None:
-                raise _misfit(self.path, int(line), row.tolist(), len(self.header))
-        return column
+        at = self._position(name, fix)
+        for line, row in zip(self.lines, self.cells, strict=True):
+            if row[at] is None:
+                raise _misfit(self.path, line, np.sum(row != None), len(self.header))  # noqa: E711
+        return self.cells[:, at]
 
-    def numbers(self, name: str, fix: str = "correct the header") -> NDArray[np.float64]:
+    def numbers(
+        self, name: str, fix: str = "correct the header", remark: str = ""
+    ) -> NDArray[np.float64]:
         """Numbers of a column, shape (rows,); NaN where one is missing.
+
+        Args:
+            name: Of the column.
+            fix: What to do if there is none.
+            remark: What to say besides if a cell holds something else.
 
         Raises:
             InputError: There is no such column, or a cell holds something else.
         """
-        cells = self.column(name, fix)
-        pairs = zip(cells, self.lines, strict=True)
-        return np.array([self._number(cell, int(line), name) for cell, line in pairs], float)
+        numbers = np.full(len(self.lines), np.nan)
+        for at, cell in enumerate(self.column(name, fix)):
+            if cell.lower() in MISSING:
+                continue
+            try:
+                numbers[at] = parse_number(cell, self.decimal)
+            except ValueError as err:
+                raise InputError(
+                    str(err),
+                    where=self.where(self.lines[at], name),
+                    fix="correct the cell, or leave it empty where a value is missing; this "
+                    f"table has {self.decimal!r} as its decimal sign (a decimal comma needs ';' "
+                    f"between the cells), and thousands are not set apart{remark}",
+                ) from None
+        return numbers
 
     def where(self, line: int, name: str) -> str:
         """Place of a cell, for a refusal."""
         return f"{self.path}: line {line}, column {name}"
 
     def _position(self, name: str, fix: str) -> int:
-        exact = [k for k, one in enumerate(self.header) if one == name]
-        near = [k for k, one in enumerate(self.header) if _plain(one) == _plain(name)]
+        exact = [at for at, one in enumerate(self.header) if one == name]
+        near = [at for at, one in enumerate(self.header) if _plain(one) == _plain(name)]
         found = exact or near
         if len(found) == 1:
             return found[0]
@@ -100,20 +129,6 @@ class Table:
             fix=fix,
         )
 
-    def _number(self, cell: str, line: int, name: str) -> float:
-        if cell.lower() in MISSING:
-            return float("nan")
-        try:
-            return parse_number(cell, self.decimal)
-        except ValueError as err:
-            raise InputError(
-                str(err),
-                where=self.where(line, name),
-                fix="correct the cell, leave it empty where a value is missing, or remove the line "
-                f"if it is no measurement; the decimal sign is taken to be {self.decimal!r}, and "
-                "thousands are not set apart",
-            ) from None
-
 
 def read_table(
     path: str | Path, *, delimiter: str | None = None, decimal: str | None = None, skip: int = 0
@@ -121,43 +136,66 @@ def read_table(
     """Read a table.
 
     Args:
-        path: The file, in any usual encoding.
-        delimiter: Between two cells; None finds it in the header.
-        decimal: "." or "," in a number; None finds it in the cells.
+        path: The file, UTF-8 text or .xlsx.
+        delimiter: Between two cells; None follows the rule of this module.
+        decimal: "." or "," in a number; None likewise.
         skip: Lines before the header.
 
     Raises:
         InputError: The file is missing, is no text, or a line does not fit its header.
     """
     path = existing_file(path)
-    lines = _decoded(path).splitlines()
-    if not any(map(str.strip, lines)):
-        raise InputError(
-            "is empty", where=str(path), fix="write a header and a line for each measurement"
-        )
-    lines = lines[skip:]
-    if lines and (told := TOLD_DELIMITER.fullmatch(lines[0].strip())):
-        lines, skip, delimiter = lines[1:], skip + 1, delimiter or told[1]
-    delimiter = delimiter or _delimiter(lines[0] if lines else "")
-    frame = _frame(path, lines, delimiter)
-    first, *rows = frame.to_numpy().tolist() or [[]]
-    header = _header(first)
-    _check_header(path, header, skip + 1)
-    kept = [(k, row) for k, row in enumerate(rows, start=skip + 2) if any(map(_text, row))]
-    for line, row in kept:
-        if any(map(_text, row[len(header) :])):
-            raise _misfit(path, line, row, len(header))
-    cells = np.empty((len(kept), len(header)), object)
-    for k, (_, row) in enumerate(kept):
-        cells[k] = [cell.strip() if isinstance(cell, str) else None for cell in row[: len(header)]]
+    if path.suffix.lower() == ".xlsx":
+        rows, delimiter, decimal = _sheet(path), ",", "."
+        rows = [row for row in rows if row[0] > skip]
+    else:
+        lines = _lines(path)
+        delimiter = delimiter or _delimiter(lines, skip)
+        rows = _rows(path, lines, delimiter, skip)
+    first, header = rows[0] if rows else (1, [])
+    while header and not header[-1]:
+        header = header[:-1]
+    _check_header(path, header, first)
+    kept = [(line, row) for line, row in rows[1:] if any(row)]
+    cells = np.full((len(kept), len(header)), None, object)
+    for at, (line, row) in enumerate(kept):
+        if any(row[len(header) :]):
+            raise _misfit(path, line, len(row), len(header))
+        cells[at, : len(row)] = row[: len(header)]
     return Table(
         path=path,
-        header=header,
+        header=tuple(header),
         delimiter=delimiter,
-        decimal=decimal or _decimal(path, delimiter, [cell for cell in cells.ravel() if cell]),
+        decimal=decimal or _decimal(delimiter, cells.ravel().tolist()),
         lines=np.array([line for line, _ in kept], np.int64),
         cells=cells,
     )
+
+
+def parse_number(text: str, decimal: str = ".") -> float:
+    """The number that a text is, blanks around it aside.
+
+    Python reads more than that: digits of other scripts, `3_0`, `infinity`, and 1e999 as infinite.
+
+    Args:
+        text: Digits 0 to 9, with a sign, a decimal sign and an exponent where there are such.
+        decimal: "." or ",".
+
+    Raises:
+        ValueError: The text is something else, or larger than a number may be.
+    """
+    text = text.strip()
+    if not NUMBERS[decimal].fullmatch(text):
+        raise ValueError(f"{text!r:.40} is no number")
+    number = float(text.replace(decimal, "."))
+    if not math.isfinite(number):
+        raise ValueError(f"{text!r:.40} is too large for a number")
+    return number
+
+
+def is_number(text: str) -> bool:
+    """Whether a cell holds a number, with either decimal sign."""
+    return any(one.fullmatch(text.strip()) for one in NUMBERS.values())
 
 
 def _plain(name: str) -> str:
@@ -165,84 +203,77 @@ def _plain(name: str) -> str:
     return "".join(name.split()).casefold()
 
 
-def _text(cell: Any) -> str:
-    """A cell without blanks around it; pandas marks cells that a line does not have by None."""
-    return cell.strip() if isinstance(cell, str) else ""
-
-
-def _decoded(path: Path) -> str:
-    """The file's text: UTF-8, what its byte order mark says, or the likeliest encoding."""
-    from charset_normalizer import from_bytes
-
-    raw = path.read_bytes()
+def _lines(path: Path) -> list[str]:
+    content = path.read_bytes()
+    marked = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        likeliest = from_bytes(raw).best()
-        text = NOT_TEXT if likeliest is None else str(likeliest)
-    if NOT_TEXT in text:
-        raise InputError("not a text file", where=str(path), fix="save it as CSV, UTF-8")
-    return text
-
-
-def _delimiter(header: str) -> str:
-    """Found in the header alone: below it a decimal comma looks like a delimiter."""
-    try:
-        return csv.Sniffer().sniff(header, delimiters=DELIMITERS).delimiter
-    except csv.Error:  # a single column
-        return ","
-
-
-def _decimal(path: Path, delimiter: str, cells: Sequence[str]) -> str:
-    """Found in the cells; a comma that may set thousands apart as well is refused."""
-    if delimiter == "," or any(has_decimals(cell, ".") for cell in cells):
-        return "."
-    commas = [cell for cell in cells if has_decimals(cell, ",")]
-    if commas and all(map(may_have_thousands, commas)):
+        text = content.decode("utf-16" if marked else "utf-8-sig")
+    except UnicodeDecodeError as err:
         raise InputError(
-            f"{commas[0]!r} may be one and a bit, or some thousands",
-            where=str(path),
-            fix="write the numbers with a decimal point and without marks for thousands",
+            f"byte {err.start} is no UTF-8 text", where=str(path), fix=SAVE_AS_CSV
+        ) from None
+    if "\0" in text:
+        raise InputError("not a text file", where=str(path), fix=SAVE_AS_CSV)
+    if not text.strip():
+        raise InputError(
+            "is empty", where=str(path), fix="write a header and a line for each measurement"
         )
-    return "," if commas else "."
+    return text.splitlines(keepends=True)
 
 
-def _frame(path: Path, lines: list[str], delimiter: str) -> "DataFrame":
-    """Texts of all lines, the header's among them; None where a line has no such cell."""
+def _delimiter(lines: list[str], skip: int) -> str:
+    """By the header alone: below it a decimal comma looks like a delimiter."""
+    header = lines[skip] if skip < len(lines) else ""
+    return next((sign for sign in (";", "\t") if sign in header), ",")
+
+
+def _rows(path: Path, lines: list[str], delimiter: str, skip: int) -> list[Row]:
+    """All lines after the first `skip`, blank ones among them, but for Excel's `sep=;`."""
+    reader = csv.reader(lines[skip:], delimiter=delimiter, skipinitialspace=True, strict=True)
+    try:
+        rows = [(reader.line_num + skip, [cell.strip() for cell in row]) for row in reader]
+    except csv.Error as err:
+        raise InputError(
+            str(err),
+            where=f"{path}: line {reader.line_num + skip}",
+            fix="look for a quotation mark that is not closed",
+        ) from err
+    return rows[1:] if rows and rows[0][1][:1] == ["sep="] else rows
+
+
+def _sheet(path: Path) -> list[Row]:
+    """The first sheet of a workbook."""
     import pandas
 
-    if not lines:
-        return pandas.DataFrame()
     try:
-        return pandas.read_csv(
-            io.StringIO("\n".join(lines)),
-            sep=delimiter,
-            header=None,
-            names=list(range(max(line.count(delimiter) for line in lines) + 1)),
-            dtype=object,
-            keep_default_na=False,
-            na_values=[],
-            skip_blank_lines=False,  # a row's number is its line's
-            skipinitialspace=True,
-            engine="python",  # the other one does not tell a short line from empty cells
-        )
-    except (pandas.errors.ParserError, csv.Error) as err:
+        sheet = pandas.read_excel(path, header=None, dtype=str, na_filter=False)
+    except ImportError as err:
+        fix = f"pip install openpyxl, or {SAVE_AS_CSV}"
+        raise InputError("is a workbook, which needs openpyxl", where=str(path), fix=fix) from err
+    except (OSError, ValueError, LookupError, zipfile.BadZipFile) as err:
+        raise InputError("no workbook that can be read", where=str(path), fix=SAVE_AS_CSV) from err
+    rows = sheet.to_numpy().tolist()
+    return [(line, [cell.strip() for cell in row]) for line, row in enumerate(rows, start=1)]
+
+
+def _decimal(delimiter: str, cells: list[str | None]) -> str:
+    numbers = [cell for cell in cells if cell and is_number(cell)]
+    return "," if delimiter == ";" and any("," in cell for cell in numbers) else "."
+
+
+def _check_header(path: Path, header: list[str], line: int) -> None:
+    """Refuse a table that begins with its numbers."""
+    if header and all(map(is_number, header)):
         raise InputError(
-            str(err), where=str(path), fix="look for a quotation mark that is not closed"
-        ) from err
+            "holds numbers, not the names of columns",
+            where=f"{path}: line {line}",
+            fix="write a line of names above the numbers, such as "
+            "time,x,y,z,inclination_xz,inclination_yz",
+        )
 
 
-def _header(cells: list[Any]) -> tuple[str, ...]:
-    """Names, without those empty ones that lines beyond the header's width have made."""
-    names = [_text(cell) for cell in cells if isinstance(cell, str)]
-    while names and not names[-1]:
-        names.pop()
-    return tuple(names)
-
-
-def _misfit(path: Path, line: int, row: list[Any], columns: int) -> InputError:
+def _misfit(path: Path, line: int, count: int, columns: int) -> InputError:
     """A line of fewer or more cells than its header."""
-    count = sum(isinstance(cell, str) for cell in row)
     extra = "put quotation marks around a cell that holds the delimiter, or remove what is extra"
     short = "complete the line, with empty cells for what is missing"
     return InputError(
@@ -250,22 +281,3 @@ def _misfit(path: Path, line: int, row: list[Any], columns: int) -> InputError:
         where=f"{path}: line {line}",
         fix=extra if count > columns else short,
     )
-
-
-def _check_header(path: Path, header: tuple[str, ...], line: int) -> None:
-    """Refuse a table that begins with its numbers."""
-    if header and all(is_number(name) for name in header):
-        raise InputError(
-            "holds numbers, not the names of columns",
-            where=f"{path}: line {line}",
-            fix="write a line of names above the numbers",
-        )
-
-
-def is_number(text: str) -> bool:
-    """Whether a cell holds a number, with either decimal sign."""
-    try:
-        parse_number(text.replace(",", "."))
-    except ValueError:
-        return False
-    return True

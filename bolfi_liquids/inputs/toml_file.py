@@ -1,7 +1,9 @@
 """TOML files that a person writes, as models of pydantic."""
 
 import tomllib
+from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
@@ -30,4 +32,19 @@ def read_toml[Model: BaseModel](path: str | Path, model: type[Model], fix: str) 
         def where(field: str) -> str:
             return f"{path}: {field}" if field else str(path)
 
-        raise InputError.from_validation(err, where=where, fix=fix) from err
+        likely = _likely(err, model)
+        raise InputError.from_validation(err, where=where, fix=likely or fix) from err
+
+
+def _likely(err: ValidationError, model: type[BaseModel]) -> str:
+    """A question for the field that an unknown one is probably meant to be; "" without one."""
+    unknown = [one["loc"] for one in err.errors() if one["type"] == "extra_forbidden"]
+    if not unknown:
+        return ""
+    *tables, name = unknown[0]
+    owner: Any = model
+    for table in tables:
+        fields = getattr(owner, "model_fields", {})
+        owner = fields[table].annotation if table in fields else None
+    close = get_close_matches(str(name), getattr(owner, "model_fields", {}), n=1, cutoff=0.5)
+    return f"did you mean {close[0]}?" if close else ""

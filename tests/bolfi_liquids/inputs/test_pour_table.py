@@ -45,21 +45,21 @@ def test_one_liquid_needs_no_name(tmp_path):
         (ROWS, HEADER, "oil", "too few pours: 1; give at least 3"),
         (ROWS, HEADER.replace("retained", "kept"), None, "has no column retained"),
         ([*ROWS[:2], "water,90,x,1,1,1"], HEADER, None, "line 4, column distance_cm: 'x'"),
-        ([*ROWS[:2], "water,90,1,1,-1,1"], HEADER, None, "line 4, column retained: -1"),
+        ([*ROWS[:2], "water,90,1,1,-1,1"], HEADER, None, "line 4, column retained: '-1'"),
         (
             [*ROWS[:2], "water,-30,1,1,1,1"],
             HEADER,
             None,
-            "angular_velocity_deg_s: -30",
+            "angular_velocity_deg_s: '-30'",
         ),
-        ([*ROWS[:2], "water,90,200,1,1,1"], HEADER, None, "200 is not between -20 and 50"),
+        ([*ROWS[:2], "water,90,200,1,1,1"], HEADER, None, "'200' is not between -20 and 50"),
         ([], "", None, "is empty"),
-        ([*ROWS[:2], "water,90,1,0,0,0"], HEADER, None, "line 4: spilled, received and retained"),
+        ([*ROWS[:2], "water,90,1,0,0,0"], HEADER, None, "line 4: spilled, received, retained"),
         (
             [*ROWS[:2], "water,90,1,1e30,1,1"],
             HEADER,
             None,
-            "line 4: spilled, received and retained",
+            "line 4: spilled, received, retained",
         ),
     ],
 )
@@ -140,9 +140,12 @@ def test_a_surplus_cell_is_refused_with_its_line(tmp_path):
 @pytest.mark.parametrize(
     ("rows", "said"),
     [
-        (["w,45,15,1,1,1", "w,90,30,1,1,1", "w,90,50,1,1,1"], "distance_cm: 15 cm.*looks like mm"),
-        (["w,45,.01,1,1,1", "w,90,.03,1,1,1", "w,90,.05,1,1,1"], "distance_cm: .*looks like m;"),
-        (["w,1.5,1,1,1,1", "w,2,1,1,1,1", "w,3,1,1,1,1"], "1.5 deg/s, which looks like rad/s"),
+        (["w,45,15,1,1,1", "w,90,30,1,1,1", "w,90,50,1,1,1"], "distance_cm: 15 cm; .* 0 to 7 cm"),
+        (
+            ["w,45,.01,1,1,1", "w,90,.03,1,1,1", "w,90,.05,1,1,1"],
+            "distance_cm: .* 0.05 cm, at least 0.14 cm",
+        ),
+        (["w,1.5,1,1,1,1", "w,2,1,1,1,1", "w,3,1,1,1,1"], "1.5 deg/s; .* 30 to 180 deg/s"),
         (["w,45,-8,1,1,1", "w,90,1,1,1,1", "w,90,2,1,1,1"], "distance_cm: -8 cm"),
         (["w,45,1,1,1,1", "w,900,1,1,1,1", "w,90,2,1,1,1"], "angular_velocity_deg_s: 900 deg/s"),
     ],

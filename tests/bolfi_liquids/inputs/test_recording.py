@@ -62,17 +62,21 @@ def in_milliseconds(data):
     return data.assign_coords(time=("time", 1000.0 * data["time"].to_numpy(), {"units": "s"}))
 
 
+def _nanoseconds(data):
+    return (1e9 * data["time"].to_numpy()).astype("timedelta64[ns]")
+
+
 BAD = {
     "no time": (lambda d: d.drop_vars("time"), "time", "missing"),
     "no x": (lambda d: d.drop_vars("x"), "x", "missing"),
     "no inclination": (lambda d: d.drop_vars("inclination_yz"), "inclination_yz", "missing"),
-    "time goes back": (backwards, "time", "time[50] = 1.6"),
-    "empty": (lambda d: d.isel(time=slice(0, 0)), "time", "0 samples"),
-    "nine samples": (lambda d: d.isel(time=slice(0, 9)), "time", "9 samples"),
-    "time in ms": (in_milliseconds, "time", "looks like milliseconds"),
+    "time goes back": (backwards, "time", "1.6 s"),
+    "empty": (lambda d: d.isel(time=slice(0, 0)), "time", " = 0"),
+    "nine samples": (lambda d: d.isel(time=slice(0, 9)), "time", " = 9"),
+    "time in ms": (in_milliseconds, "time", "33.3333 s"),
     "ms by units": (with_units("time", "ms"), "time", "'ms'"),
-    "gap in x": (with_values("x", blank(GAP)), "x", "no gripper position for 0.5"),
-    "gap at the start": (with_values("z", blank(slice(0, 9))), "z", "no gripper position for 0.3"),
+    "gap in x": (with_values("x", blank(GAP)), "x", "0.533333 s from 1.97 s on"),
+    "gap at the start": (with_values("z", blank(slice(0, 9))), "z", "0.3 s from 0.00 s on"),
     "never seen": (
         with_values("inclination_xz", blank(slice(None))),
         "inclination_xz",
@@ -81,56 +85,66 @@ BAD = {
     "long blind": (
         with_values("inclination_yz", blank(slice(60, 90))),
         "inclination_yz",
-        "NaN for 1.0",
+        "1.03333 s from 1.97 s on",
     ),
     "infinite angle": (
         with_values("inclination_xz", lambda v: np.where(v == v.max(), np.inf, v)),
         "inclination_xz",
-        "infinite",
+        "inf rad",
     ),
     "floating stick": (with_attribute("stick_density", 60.0), "stick_density", "floats up"),
-    "stick in grams": (with_attribute("stick_mass", 17.0), "stick_mass", "looks like grams"),
+    "stick in grams": (with_attribute("stick_mass", 17.0), "stick_mass", "17 kg"),
     "no stir": (
         lambda d: with_values("x", np.zeros_like)(with_values("y", np.zeros_like)(d)),
         "x, y",
-        "moves less",
+        " = 0 m",
     ),
-    "degrees": (with_values("inclination_xz", np.degrees), "inclination_xz", "looks like degrees"),
+    "degrees": (with_values("inclination_xz", np.degrees), "inclination_xz", "7.30548 rad"),
     "radians twice": (
         lambda d: with_values("inclination_xz", np.radians)(
             with_values("inclination_yz", np.radians)(d)
         ),
         "inclination_yz",
-        "looks like radians that were taken for degrees",
+        " deg while the gripper moves",
     ),
     "degrees by units": (with_units("inclination_yz", "degree"), "inclination_yz", "'degree'"),
-    "gripper in mm": (with_values("y", lambda v: 1000 * v), "y", "looks like cm or mm"),
+    "gripper in mm": (with_values("y", lambda v: 1000 * v), "y", "24.548 m"),
     "mm by units": (with_units("z", "mm"), "z", "'mm'"),
     "infinite": (with_values("x", lambda v: np.where(v == v.max(), np.inf, v)), "x", "inf"),
     "no cup": (without_attribute("cup_radius"), "cup_radius", "missing"),
     "no weight": (without_attribute("stick_density"), "stick_density or stick_mass", "missing"),
     "negative radius": (with_attribute("cup_radius", -0.04), "cup_radius", "-0.04"),
     "radius as text": (with_attribute("stick_radius", "4.5 mm"), "stick_radius", "'4.5 mm'"),
-    "cup in mm": (with_attribute("cup_height", 75.0), "cup_height", "looks like cm or mm"),
+    "cup in mm": (with_attribute("cup_height", 75.0), "cup_height", "75 m"),
     "g/cm3": (with_attribute("liquid_density", 1.26), "liquid_density", "1.26"),
     "overfull": (with_attribute("fill", 0.08), "fill", "0.08"),
     "thick stick": (with_attribute("stick_radius", 0.05), "stick_radius", "0.05"),
-    "short stick": (with_attribute("stick_length", 0.1), "stick_length", "does not reach"),
-    "long stick": (with_attribute("stick_length", 0.3), "stick_length", "through the floor"),
+    "short stick": (with_attribute("stick_length", 0.1), "stick_length", "0.05 m deep"),
+    "long stick": (with_attribute("stick_length", 0.3), "stick_length", "-0.065 m"),
     "complex": (with_values("inclination_yz", lambda v: v + 0j), "inclination_yz", "complex128"),
     "whole numbers": (
         with_values("x", lambda v: np.rint(1000 * v).astype(int)),
         "x",
-        "int64, not decimal",
+        "int64",
     ),
-    "cup of 1 m": (with_attribute("cup_radius", 1.0), "cup_radius", "1.0 m looks like"),
-    "tiny cup": (with_attribute("cup_radius", 0.0004), "cup_radius", "0.0004 m is too small"),
-    "heavy stick": (with_attribute("stick_mass", 1.7), "stick_mass", "looks like g"),
+    "dates": (
+        lambda d: d.assign_coords(time=np.datetime64("2026-11-29", "ns") + _nanoseconds(d)),
+        "time",
+        "holds dates",
+    ),
+    "nanoseconds": (
+        lambda d: d.assign_coords(time=_nanoseconds(d).astype(np.int64)),
+        "time",
+        "holds int64",
+    ),
+    "cup of 1 m": (with_attribute("cup_radius", 1.0), "cup_radius", "1 m"),
+    "tiny cup": (with_attribute("cup_radius", 0.0004), "cup_radius", "0.0004 m"),
+    "heavy stick": (with_attribute("stick_mass", 1.7), "stick_mass", "1.7 kg"),
     "several sizes": (with_attribute("cup_radius", [0.04, 0.05]), "cup_radius", "array"),
     "no inclination at all": (
         with_values("inclination_xz", np.zeros_like),
         "inclination_xz",
-        "the camera stood still",
+        "5.3 s at 0 rad from 0.00 s on",
     ),
     "one inclination": (
         with_values("inclination_yz", lambda v: np.full_like(v, 0.02)),
@@ -145,26 +159,26 @@ BAD = {
     "frozen again and again": (
         with_values("inclination_xz", lambda v: v[np.arange(len(v)) // 12 * 12]),
         "inclination_xz",
-        "the camera stood still",
+        "from 5.60 s on",
     ),
     "random": (
         with_values(
             "inclination_xz", lambda v: 1.5 * np.random.default_rng(0).uniform(-1, 1, len(v))
         ),
         "inclination_xz",
-        "jumps by",
+        " of 201",
     ),
     "small degrees": (
         with_values("inclination_xz", lambda v: np.degrees(v) / 5),
         "inclination_xz",
-        "looks like degrees",
+        "the rim stops the stick at 0.46 rad",
     ),
     "from above": (
         with_values("inclination_yz", lambda v: np.pi - np.abs(v)),
         "inclination_yz",
-        "from the upward vertical",
+        "3.14115 rad",
     ),
-    "outside": (with_values("x", lambda v: v + 0.05), "x", "leaves the cup"),
+    "outside": (with_values("x", lambda v: v + 0.05), "x", "0.075 m from the axis"),
 }
 
 

@@ -14,10 +14,10 @@ COMMAS = "t (ms);x;note\n0;1,5;a\n1;-2e-3;b\n"
 
 
 @pytest.mark.parametrize(
-    "text", [POINTS, COMMAS, COMMAS.replace(";", "\t"), POINTS.replace(",", "|")]
+    "text", [POINTS, COMMAS, POINTS.replace(",", "\t"), POINTS.replace(",", ";")]
 )
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
-def test_delimiter_and_decimal_sign_are_found(tmp_path, text, newline):
+def test_the_header_tells_the_delimiter_and_with_it_the_decimal_sign(tmp_path, text, newline):
     path = tmp_path / "table.csv"
     path.write_text(text, newline=newline)
     table = read_table(path)
@@ -32,14 +32,44 @@ def test_only_whole_numbers_tell_the_decimal_sign(tmp_path, other):
     np.testing.assert_array_equal(read_table(path).numbers("x"), [30.5, 1.5e-3])
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
-def test_the_encoding_is_found(tmp_path, encoding):
+@pytest.mark.parametrize("delimiter", ["\t", "|"])
+def test_a_map_may_give_other_signs(tmp_path, delimiter):
+    path = tmp_path / "table.csv"
+    path.write_text(COMMAS.replace(";", delimiter))
+    with pytest.raises(InputError):
+        read_table(path).numbers("x")
+    table = read_table(path, delimiter=delimiter, decimal=",")
+    np.testing.assert_array_equal(table.numbers("x"), [1.5, -2e-3])
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_the_encoding_is_utf_8_or_what_the_byte_order_mark_says(tmp_path, encoding):
     path = tmp_path / "table.csv"
     rows = "".join(f"{k};Öl, zähflüssig und süß\n" for k in range(20))
     path.write_bytes(f"Größe;Flüssigkeit\n{rows}".encode(encoding))
     table = read_table(path)
     assert table.header == ("Größe", "Flüssigkeit")
     assert set(table.column("Flüssigkeit")) == {"Öl, zähflüssig und süß"}
+
+
+def test_another_encoding_is_refused_with_its_byte(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_bytes("x,Öl\n1,2\n".encode("cp1252"))
+    with pytest.raises(InputError, match="byte 2") as refused:
+        read_table(path)
+    assert "UTF-8" in refused.value.fix
+
+
+def test_a_workbook_is_read_as_a_table(tmp_path):
+    book = pytest.importorskip("openpyxl").Workbook()
+    for row in (["t", "x", "note"], [0, 1.5, "a"], [1, None, ""], [2, 0.1, "b"]):
+        book.active.append(row)
+    book.save(tmp_path / "table.xlsx")
+    table = read_table(tmp_path / "table.xlsx")
+    assert table.header == ("t", "x", "note")
+    np.testing.assert_array_equal(table.numbers("x"), [1.5, np.nan, 0.1])
+    with pytest.raises(InputError, match="line 2, column note"):
+        table.numbers("note")
 
 
 def test_every_double_comes_back_exactly(tmp_path):
@@ -131,14 +161,13 @@ def test_odd_numerals_are_refused_with_their_place(tmp_path, odd, delimiter):
     assert odd in refused.value.what
 
 
-def test_a_comma_that_may_set_thousands_apart_is_refused(tmp_path):
+def test_a_comma_is_a_decimal_sign_only_beside_semicolons(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text("a;b\n1,234;2\n5,678;3\n")
+    assert read_table(path).numbers("a").tolist() == [1.234, 5.678]
+    path.write_text("a\tb\n1,234\t2\n5,678\t3\n")
     with pytest.raises(InputError, match="1,234"):
-        read_table(path)
-    assert read_table(path, decimal=",").numbers("a").tolist() == [1.234, 5.678]
-    path.write_text("a;b\n1,234;2\n0,678;3\n")  # nobody writes a thousand so
-    assert read_table(path).numbers("a").tolist() == [1.234, 0.678]
+        read_table(path).numbers("a")
 
 
 def test_the_line_that_tells_excel_the_delimiter_is_no_header(tmp_path):

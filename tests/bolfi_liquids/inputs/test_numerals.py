@@ -2,7 +2,7 @@
 
 import pytest
 
-from bolfi_liquids.numerals import parse_number
+from bolfi_liquids.inputs.table import parse_number
 
 ODD = ["3_0", "٣", "３", "1e999", "-1e999", "inf", "nan", "infinity", "0x10", "1,5", "1 000", ""]
 ODD += [".", "1.2.3", "--1", "1e", "e5", "1.5e2.5", "5%", "½"]
