@@ -129,8 +129,7 @@ class RenderedView(NamedTuple):
         seed = 10 * self.seed + _SEEDS[self.view]
         stage = prepare(scene, camera_model(camera), look, seed)
         place = CupPlace(rig.cup.position, float(np.radians(rig.cup.yaw_deg)))
-        # webcams start when they like
-        timing = Timing(rate=camera.rate, offset=1000.0 * _SEEDS[self.view], seed=seed)
+        timing = Timing(rate=camera.rate, seed=seed)
         truth = None if self.truth is None else self.truth / truth_file(self.view)
         return RenderedCamera(stage, StreamedWorld(self.address, place), timing, truth=truth)
 

@@ -30,8 +30,7 @@ class FrameMeasurement(NamedTuple):
 
     Attributes:
         index: Of the frame.
-        stamp: On the camera's clock [s].
-        host: Of arrival, on this computer's clock [s].
+        stamp: When the camera gave it, on this computer's clock [s].
         marker_column, marker_row: Centre of the marker [px], NaN when it was not found.
         angle: Of the stick's line in undistorted coordinates, from the picture's downward
             vertical, positive to the right [rad]; NaN when there is none.
@@ -45,7 +44,6 @@ class FrameMeasurement(NamedTuple):
 
     index: int  # pyright: ignore[reportIncompatibleMethodOverride]
     stamp: float
-    host: float
     marker_column: float
     marker_row: float
     angle: float

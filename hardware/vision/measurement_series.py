@@ -16,7 +16,7 @@ class FrameSeries(NamedTuple):
     """Measurements of one view; all of shape (N,), one row a frame.
 
     Attributes:
-        stamp: On the camera's clock [s].
+        stamp: When the camera gave it, on this computer's clock [s].
         marker: Column and row of the marker [px], shape (N, 2), NaN where it is hidden.
         lines: The stick's line.
         flags: `Flag` as numbers.
@@ -56,7 +56,7 @@ def as_series(frames: Sequence[FrameMeasurement]) -> FrameSeries:
 
 
 def interpolate_lines(series: FrameSeries, stamps: np.ndarray) -> Interpolated:
-    """Lines at other times of the camera's clock, by cubics through the nearest good frames.
+    """Lines at other times, by cubics through the nearest good frames.
 
     Frames whose line is doubtful are passed over. There are two neighbours on each side, one
     where the second is more than `LONGEST_GAP` away, and none across a longer gap.

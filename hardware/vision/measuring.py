@@ -228,7 +228,6 @@ def _as_measurement(
     return FrameMeasurement(
         index=frame.index,
         stamp=frame.stamp,
-        host=frame.host,
         marker_column=marker.column if marker is not None else nan,
         marker_row=marker.row if marker is not None else nan,
         angle=float(np.arctan(slope)),

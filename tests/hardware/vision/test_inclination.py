@@ -98,7 +98,6 @@ def frame(k: int, stamp: float, angle: float, flags: int = 0) -> FrameMeasuremen
     return FrameMeasurement(
         index=k,
         stamp=stamp,
-        host=stamp,
         marker_column=nothing,
         marker_row=nothing,
         angle=angle,
