@@ -77,14 +77,11 @@ def plan_pour(run: Run, rig: "Rig") -> PourMotion:
 
 def _check_receiver(chosen: ChosenPour, rig: "Rig") -> None:
     """Only the cups of the pour say how wide its receiver is."""
-    from ..hardware.rig import check_receiver
+    from ..hardware.rig_checks import receiver_fault
 
-    try:
-        check_receiver(rig, chosen.cups.receiver.radius)
-    except ValueError as err:
-        raise InputError(
-            str(err), where="pouring.receiver", fix="move the receiver away, and correct the rig"
-        ) from err
+    if fault := receiver_fault(rig, chosen.cups.receiver.radius):
+        fix = "move the receiver away, and correct the rig"
+        raise InputError(fault, where="pouring.receiver", fix=fix)
 
 
 def execute_pour(

@@ -55,13 +55,12 @@ def plan_stir(rig: "Rig", cycles: int | None = None) -> StirPlan:
     """
     from ..hardware import check_path
     from ..hardware.motion import insert, retract, strokes
-    from ..hardware.rig import MAX_CYCLES, checked_cycles
+    from ..hardware.rig import MAX_CYCLES
 
-    try:
-        count = checked_cycles(rig.stirring.cycles if cycles is None else cycles)
-    except ValueError as err:
+    count = rig.stirring.cycles if cycles is None else cycles
+    if not 1 <= count <= MAX_CYCLES:
         fix = f"give a whole number from 1 to {MAX_CYCLES}"
-        raise InputError(f"{cycles}", where=Argument("cycles"), fix=fix) from err
+        raise InputError(f"{count}", where=Argument("cycles"), fix=fix)
     if rig.stirring.rest < MIN_REST:
         raise InputError(
             f"{rig.stirring.rest:g} s",

@@ -63,11 +63,9 @@ class Webcam:
         Raises:
             CameraError: the camera stopped to deliver.
         """
-        for _ in range(BUFFERS):
-            asked = time.monotonic()
-            stamp = self._grab()
-            if stamp - asked >= MIN_WAIT:
-                break
+        asked, stamp, grabbed = time.monotonic(), self._grab(), 1
+        while stamp - asked < MIN_WAIT and grabbed < BUFFERS:
+            asked, stamp, grabbed = stamp, self._grab(), grabbed + 1
         image = self._retrieve()
         return Frame(self._index - 1, stamp, np.ascontiguousarray(grey(image)))
 

@@ -14,7 +14,6 @@ from pydantic import ValidationError
 from ..board import host_time
 from ..errors import RigError
 from ..rig import Rig, View
-from ..rig_numbers import RECORDED
 from ..vision.camera_model import CameraModel, as_fields, from_fields
 from .events import EVENTS, FULL, drop_reserve, make_reserve, read_events
 from .names import frames_file, truth_file, video_file
@@ -146,8 +145,8 @@ def read_provenance(directory: Path) -> Provenance:
     try:
         written = json.loads(path.read_text(encoding="utf-8"))
         return Provenance(
-            # a recording stays readable whatever ends an arm's numbers have since
-            rig=Rig.model_validate(written["rig"], context=RECORDED),
+            # without `checked_rig`: it stays readable whatever ends an arm's numbers have since
+            rig=Rig.model_validate(written["rig"]),
             hash=written["hash"],
             cameras={view: from_fields(written["cameras"][view]) for view in VIEWS},
             version=written["version"],
