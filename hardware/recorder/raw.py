@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from ..errors import RigError
 from ..rig import View
 from ..vision.frame_measurement import FrameMeasurement
-from ..vision.inclination import ViewLines
-from ..vision.measurement_series import FrameSeries
 from .csv_file import read_csv
 from .directory import VIEWS, Provenance, read_provenance
 from .names import frames_file
@@ -60,16 +58,6 @@ def read_raw(directory: Path) -> Raw:
     counts |= {frames_file(view): len(frames[view]["stamp"]) for view in VIEWS}
     _check_enough(directory, counts, [f"view {view}: {one}" for view, one in faults.items() if one])
     return Raw(provenance, samples, frames, lost_rows(rows["index"]), faults)
-
-
-def frame_series(frames: Columns) -> FrameSeries:
-    """A view's frames in the form that the joining takes."""
-    return FrameSeries(
-        stamp=frames["stamp"],
-        marker=np.column_stack([frames["marker_column"], frames["marker_row"]]),
-        lines=ViewLines(*(frames[name] for name in ViewLines._fields)),
-        flags=frames["flags"].astype(np.int64),
-    )
 
 
 def lost_rows(index: NDArray[np.float64]) -> int:

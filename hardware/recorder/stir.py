@@ -11,9 +11,9 @@ from ..rig import View
 from ..vision.clock import Clock, ClockError, fit_clock
 from ..vision.frame_measurement import BAD_LINE
 from ..vision.joined_views import MeasuredView, join
-from ..vision.measurement_series import FrameSeries
+from ..vision.measurement_series import FrameSeries, frame_series
 from .directory import VIEWS
-from .raw import Columns, Raw, frame_series
+from .raw import Columns, Raw
 
 TABLE_RATE = 30.0  # of the table [1/s]; the cameras' in "To Stir or Not to Stir"
 CLOCK_MARGIN = 1.0  # [s] before and after the stir that the clocks are learned from, too

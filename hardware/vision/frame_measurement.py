@@ -21,7 +21,6 @@ class Flag(IntFlag):
 
 
 MARKER_ONLY = Flag.NO_MARKER
-BAD_MARKER = Flag.NO_MARKER | Flag.REPEATED_IMAGE
 BAD_LINE = ~MARKER_ONLY
 
 
@@ -58,8 +57,3 @@ class FrameMeasurement(NamedTuple):
 def line_is_good(flags: int) -> bool:
     """Whether the line of a frame with these flags may be used."""
     return not flags & BAD_LINE
-
-
-def marker_is_good(flags: int) -> bool:
-    """Whether the marker of a frame with these flags may be used."""
-    return not flags & BAD_MARKER

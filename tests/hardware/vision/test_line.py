@@ -22,11 +22,8 @@ from bolfi_liquids.hardware.vision import (
     Flag,
     Frame,
     FrameMeter,
-    StickView,
     Track,
-    ViewError,
     line_is_good,
-    marker_is_good,
     measure,
 )
 
@@ -219,7 +216,7 @@ def test_a_hidden_marker_leaves_the_line_good():
     image[:95, 260:420] = 60
     found, _ = measure(Frame(1, 1 / 30, image), bench.view, track)
     assert Flag(found.flags) == Flag.NO_MARKER
-    assert line_is_good(found.flags) and not marker_is_good(found.flags)
+    assert line_is_good(found.flags) and found.flags & Flag.NO_MARKER
     expected = bench.truth((6.0, 0.0), (0.006, 0.0, 0.235))
     assert np.degrees(found.angle - expected) == pytest.approx(0.0, abs=0.03)
 
@@ -247,16 +244,6 @@ def test_a_picture_of_another_size_is_refused():
     bench = Bench(FAULTLESS)
     with pytest.raises(ValueError, match="calibrate at the size"):
         bench.measure(np.zeros((240, 320), np.uint8))
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("stick_radius", 0.0), ("marker_radius", float("nan")), ("contrast", "grey")],
-)
-def test_impossible_views_are_refused(name, value):
-    view: StickView = Bench(CLEAN).view
-    with pytest.raises(ViewError, match=name):
-        dataclasses.replace(view, **{name: value})
 
 
 def gross_errors(frames: int, seed: int) -> tuple[float, float, float, float]:
