@@ -1,6 +1,6 @@
 """The command group `rig`: the robot and the cameras, before anything is recorded."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -81,13 +81,13 @@ def calibrate_cameras(
     ] = None,
 ) -> None:
     """Learn a camera's lens from a board and a plumb line."""
-    from ..robot.camera_calibration import Pictures, calibrate_view, write_board
+    from ..robot.camera_calibration import calibrate_view, write_board
 
     if print_board is not None:
         typer.echo(f"{write_board(print_board)}: print it, measure a square, glue it on a plate")
         return
-    given = Pictures(pictures.square / 100, pictures.boards, pictures.plumb_line)
-    for line in calibrate_view(rig, view, given, out=pictures.out):
+    given = asdict(pictures) | {"square": pictures.square / 100}
+    for line in calibrate_view(rig, view, **given):
         typer.echo(line)
 
 
