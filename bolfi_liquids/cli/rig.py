@@ -1,6 +1,6 @@
 """The command group `rig`: the robot and the cameras, before anything is recorded."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -86,8 +86,15 @@ def calibrate_cameras(
     if print_board is not None:
         typer.echo(f"{write_board(print_board)}: print it, measure a square, glue it on a plate")
         return
-    given = asdict(pictures) | {"square": pictures.square / 100}
-    for line in calibrate_view(rig, view, **given):
+    told = calibrate_view(
+        rig,
+        view,
+        square=pictures.square / 100,
+        boards=pictures.boards,
+        plumb_line=pictures.plumb_line,
+        out=pictures.out,
+    )
+    for line in told:
         typer.echo(line)
 
 
