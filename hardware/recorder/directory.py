@@ -87,8 +87,7 @@ def start_directory(
         directory.mkdir(parents=True, exist_ok=True)
         check_empty(directory)
         _check_room(directory, expected_bytes(rig, duration, videos=videos))
-        _write_first(directory / RIG, json.dumps(written, indent=1) + "\n")
-        _reserve(directory)
+        _begin(directory, json.dumps(written, indent=1) + "\n")
     except OSError as err:
         full = err.errno in FULL
         raise RigError(
@@ -181,23 +180,19 @@ def check_empty(directory: Path) -> None:
         )
 
 
-def _write_first(path: Path, text: str) -> None:
-    """Write a file that nobody else has begun: of two sessions that start together one goes on."""
+def _begin(directory: Path, text: str) -> None:
+    """Write rig.json and set the reserve aside, both or neither.
+
+    Of two sessions that start together one goes on.
+    """
     try:
-        file = path.open("x", encoding="utf-8")
+        file = (directory / RIG).open("x", encoding="utf-8")
     except FileExistsError:
-        check_empty(path.parent)
+        check_empty(directory)
         raise
     try:
         with file:
             file.write(text)
-    except OSError:  # leave nothing in the way of the next try
-        path.unlink()
-        raise
-
-
-def _reserve(directory: Path) -> None:
-    try:
         make_reserve(directory)
     except OSError:  # leave nothing in the way of the next try
         drop_reserve(directory)

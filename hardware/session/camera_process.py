@@ -25,7 +25,7 @@ from ..recorder.views import stick_view
 from ..rig import Rig, View
 from ..signals import leave_signals_to_main
 from ..vision.frame import Frame
-from ..vision.frame_measurement import FrameMeasurement, line_is_good
+from ..vision.frame_measurement import Flag, FrameMeasurement, line_is_good
 from ..vision.measuring import FrameMeter
 
 SAME_PICTURES = 3  # in a row; a camera's noise makes no two alike
@@ -91,26 +91,24 @@ class _Tally(NamedTuple):
     rate: Rate
     last: int = -1  # index of the last picture
     lost: int = 0
-    image: np.ndarray | None = None
     same: int = 1  # times that the last picture has come in a row
     beat: float = 0.0  # when the last new one came
     worst: float = 0.0  # longest time between new ones
     angle: float = float("nan")
 
 
-def tallied(tally: _Tally, frame: Frame, angle: float, now: float) -> _Tally:
+def tallied(tally: _Tally, row: FrameMeasurement, now: float) -> _Tally:
     """What is remembered after another picture, which came at `now` [s]."""
-    new = tally.image is None or not np.array_equal(frame.image, tally.image)
+    new = not row.flags & Flag.REPEATED_IMAGE
     between = now - tally.beat if new and tally.beat else 0.0
     return tally._replace(
         rate=counted(tally.rate, 1, now),
-        last=frame.index,
-        lost=tally.lost + max(frame.index - tally.last - 1, 0),
-        image=frame.image,
+        last=row.index,
+        lost=tally.lost + max(row.index - tally.last - 1, 0),
         same=1 if new else tally.same + 1,
         beat=now if new else tally.beat,
         worst=max(tally.worst, between),
-        angle=angle,
+        angle=row.angle if line_is_good(row.flags) else float("nan"),
     )
 
 
@@ -166,8 +164,7 @@ class _CameraProcess:
         row = self._meter.measure(frame)
         self._keep(frame, row)
         self._watch_stamp(frame)
-        seen = row.angle if line_is_good(row.flags) else float("nan")
-        self._tally = tallied(self._tally, frame, seen, came)
+        self._tally = tallied(self._tally, row, came)
         if self._tally.same == SAME_PICTURES:
             reason = f"the same picture came {SAME_PICTURES} times in a row"
             self._complain(Trouble.SAME_PICTURE, "same_picture", reason=reason, index=frame.index)

@@ -349,10 +349,10 @@ def test_a_stamp_that_is_no_number_costs_no_video(tmp_path):
 
 
 def test_lost_and_repeated_pictures_are_counted():
-    tally = Tally(no_rate(0.0))
+    tally, meter = Tally(no_rate(0.0)), FrameMeter(stick_view(RIG, "xz"))
     for k, index in enumerate([0, 1, 2, 5, 6, 10]):
-        image = np.full((2, 2), min(k, 3), np.uint8)
-        tally = tallied(tally, Frame(index, k / 30, image), 0.0, 1.0 + k / 30)
+        image = np.full((480, 640), min(k, 3), np.uint8)
+        tally = tallied(tally, meter.measure(Frame(index, k / 30, image)), 1.0 + k / 30)
     assert (tally.rate.total, tally.lost, tally.same) == (6, 5, 3)
     assert tally.beat == pytest.approx(1.1)
     assert tally.worst == pytest.approx(1 / 30)
