@@ -114,7 +114,7 @@ def finished(directory: Path) -> Recording:
 
 @contextmanager
 def save_on_stop(directory: Path) -> Iterator[None]:
-    """What is left of a session that is stopped within becomes a recording.
+    """Save the frames taken before a stop as a recording.
 
     Raises:
         SessionStopped: It was stopped, or interrupted; the message says what is left.
