@@ -47,12 +47,12 @@ def read_raw(directory: Path) -> Raw:
     provenance = read_provenance(directory)
     rows = _read(directory / SAMPLES, Sample._fields)
     samples = _rising(rows, "time")
-    stirring = samples["host"][samples["stirring"] == 1]
+    begin = samples["host"][samples["stirring"] == 1].min(initial=np.inf)
     frames: dict[View, Columns] = {}
     faults: dict[View, str] = {}
     for view in VIEWS:
         seen = _read(directory / frames_file(view), FrameMeasurement._fields)
-        end, faults[view] = first_fault(seen["index"], seen["stamp"], min(stirring, default=np.inf))
+        end, faults[view] = first_fault(seen["index"], seen["stamp"], begin)
         frames[view] = {name: values[:end] for name, values in seen.items()}
     counts = {SAMPLES: len(samples["time"])}
     counts |= {frames_file(view): len(frames[view]["stamp"]) for view in VIEWS}

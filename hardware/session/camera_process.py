@@ -167,7 +167,7 @@ class _CameraProcess:
         self._tally = tallied(self._tally, row, came)
         if self._tally.same == SAME_PICTURES:
             reason = f"the same picture came {SAME_PICTURES} times in a row"
-            self._complain(Trouble.SAME_PICTURE, "same_picture", reason=reason, index=frame.index)
+            self._complain(Trouble.SAME_PICTURE, reason=reason, index=frame.index)
         self._beat()
 
     def _watch_stamp(self, frame: Frame) -> None:
@@ -176,7 +176,7 @@ class _CameraProcess:
         self._stamps = first, frame.stamp
         if not frame.stamp > before and self._trouble is Trouble.NONE:
             reason = stamp_fault(frame.stamp - before, frame.index, before - first)
-            self._complain(Trouble.BAD_STAMPS, "bad_stamps", reason=reason, index=frame.index)
+            self._complain(Trouble.BAD_STAMPS, reason=reason, index=frame.index)
 
     def _keep(self, frame: Frame, row: FrameMeasurement) -> None:
         table, video = self._table, self._video
@@ -186,13 +186,13 @@ class _CameraProcess:
             self._disk.write(video_file(self._view), partial(video.write, frame.image, frame.stamp))
 
     def _lose(self, reason: str) -> None:
-        self._complain(Trouble.SOURCE_LOST, "source_lost", reason=reason)
+        self._complain(Trouble.SOURCE_LOST, reason=reason)
         self._beat()
 
-    def _complain(self, trouble: Trouble, kind: str, **fields: float | str) -> None:
+    def _complain(self, trouble: Trouble, **fields: float | str) -> None:
         # it stays on the board: nothing that stopped an arm resumes by itself
         self._trouble = trouble
-        self._disk.tell(kind, **fields)
+        self._disk.tell(trouble.kind, **fields)
 
     def _beat(self) -> None:
         tally = self._tally
