@@ -19,6 +19,8 @@ from ..inputs.recording import Recording, recording_warnings
 from ..inputs.settings import (
     CalibrationSettings,
     CriticismSettings,
+    Sampler,
+    Surrogate,
 )
 from ..inputs.start import check_start
 from ..progress import Advance, after_first, progress_bar
@@ -54,10 +56,10 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     cups: "Cups | str | Path | None" = None,
     budget: int = 20,
     seed: int = 0,
-    surrogate: str = "signal",
+    surrogate: Surrogate = "signal",
     batch: int = 4,
     particles: int = 0,
-    sampler: str = "nuts",
+    sampler: Sampler = "nuts",
     chains: int = 4,
     draws: int = 1000,
     resume: bool = False,

@@ -28,6 +28,7 @@ from ..inputs.settings import (
     RUNS_PER_POINT,
     SURROGATES,
     SbcSettings,
+    Surrogate,
 )
 from ..progress import progress_bar
 from ..run.provenance import versions
@@ -131,7 +132,7 @@ class SbcStudy:
     compute: "Compute"
     progress: bool
 
-    def replicates(self, name: str) -> "Replicates":
+    def replicates(self, name: Surrogate) -> "Replicates":
         """Calibrations of stirs whose truths are known, by one of `SURROGATES`."""
         from .. import inference
 

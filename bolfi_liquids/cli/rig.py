@@ -81,11 +81,18 @@ def calibrate_cameras(
     ] = None,
 ) -> None:
     """Learn a camera's lens from a board and a plumb line."""
-    from ..robot.camera_calibration import Pictures, calibrate_view, write_board
+    from ..robot.camera_calibration import calibrate_view, write_board
 
     if print_board is not None:
         typer.echo(f"{write_board(print_board)}: print it, measure a square, glue it on a plate")
         return
-    given = Pictures(pictures.square / 100, pictures.boards, pictures.plumb_line)
-    for line in calibrate_view(rig, view, given, out=pictures.out):
+    told = calibrate_view(
+        rig,
+        view,
+        square=pictures.square / 100,
+        boards=pictures.boards,
+        plumb_line=pictures.plumb_line,
+        out=pictures.out,
+    )
+    for line in told:
         typer.echo(line)

@@ -83,12 +83,9 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         RuntimeError: Simulations failed; the message says how.
     """
     started = time.perf_counter()
-    settings = CriticismSettings(
-        effects=effects,
-        accept=accept,
-        seed=seed,
-        batch=batch,
-    )
+    # their rules make them tuples
+    named: dict[str, Any] = {"effects": effects, "accept": accept}
+    settings = CriticismSettings(**named, seed=seed, batch=batch)
     check_effects(settings)
     given = ComparedData(
         open_recordings(held_out, Argument("held_out")),

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 Surrogate = Literal["signal", "discrepancy"]
 """What is emulated: the inclination itself, or, as in the paper, the discrepancy."""
 SURROGATES: tuple[Surrogate, ...] = get_args(Surrogate)
+Sampler = Literal["nuts", "emcee"]
+"""Of the posterior."""
+Risk = Literal["mean", "cvar"]
+"""Spillage to keep low: the mean, or that of the worst tenth of the draws."""
 
 PAPER_RULES = {"acquisition": "lcb", "threshold": "min_mean"}
 """Engine options that go with the paper's surrogate, on which the results were measured."""
@@ -135,7 +139,7 @@ class CalibrationSettings:
     seed: Seed = 0
     surrogate: Annotated[Surrogate, told("What is emulated, see guide priors.")] = "signal"
     particles: Particles = 0
-    sampler: Annotated[Literal["nuts", "emcee"], told("Sampler of the posterior.")] = "nuts"
+    sampler: Annotated[Sampler, told("Sampler of the posterior.")] = "nuts"
     chains: Annotated[Integer, told("Chains of the sampler; R-hat needs two.", ge=2, le=1000)] = 4
     draws: Annotated[Integer, told("Draws kept of each chain.", ge=4, le=MAX_COUNT)] = 1000
 
@@ -172,7 +176,7 @@ class SbcSettings:
         """Their number, by surrogate."""
         return {"signal": self.runs, "discrepancy": self.sequential}
 
-    def calibration(self, surrogate: str) -> CalibrationSettings:
+    def calibration(self, surrogate: Surrogate) -> CalibrationSettings:
         """Settings of one replicate: those of `calibrate`."""
         return CalibrationSettings(
             budget=self.budget, surrogate=surrogate, particles=self.particles
@@ -186,9 +190,7 @@ class PourSettings:
     budget: Annotated[Pours, told("Pours simulated at most, 24 to 100.")] = 64
     iterations: Annotated[Simulations, told("Angular velocities tried.")] = 31
     draws: Annotated[Count, told("Posterior draws that each action is tried on.")] = 128
-    risk: Annotated[
-        Literal["mean", "cvar"], told("Spillage to keep low: the mean, or the worst tenth's.")
-    ] = "mean"
+    risk: Annotated[Risk, told("Spillage to keep low: the mean, or the worst tenth's.")] = "mean"
     seed: Seed = 0
 
 

@@ -17,7 +17,7 @@ from ..errors import Argument, InputError
 from ..inputs.cups import cups_of
 from ..inputs.pour_table import Pours, PourTable, check_scene, table_of
 from ..inputs.prior import PARAMETERS
-from ..inputs.settings import PourSettings
+from ..inputs.settings import PourSettings, Risk
 from ..progress import progress_bar
 from ..run.compute import open_compute
 from ..run.given_pours import GIVEN_POURS, digest_of_pours, keep_pours, kept_pours
@@ -52,7 +52,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     budget: int = PourSettings.budget,
     iterations: int = PourSettings.iterations,
     draws: int = PourSettings.draws,
-    risk: str = "mean",
+    risk: Risk = "mean",
     seed: int = 0,
     force: bool = False,
     executor: "Workers | None" = None,

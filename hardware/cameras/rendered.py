@@ -1,4 +1,4 @@
-"""A camera that renders what a world shows, in real time and with a clock of its own."""
+"""A camera that renders what a world shows, in real time."""
 
 import csv
 from dataclasses import dataclass
@@ -22,22 +22,18 @@ class Timing:
     """When a rendered camera takes its frames.
 
     Attributes:
-        rate: Frames per second of its own clock.
+        rate: Frames per second.
         latency: From the middle of the exposure to the frame's arrival [s].
-        offset: Camera's clock minus this computer's, when the camera starts [s].
-        drift: Camera's clock runs so much faster than this computer's; 1e-5 is usual.
         seed: Of noise and faults.
     """
 
     rate: float = 30.0
     latency: float = 0.03
-    offset: float = 1000.0
-    drift: float = 2e-5
     seed: int = 0
 
 
 class RenderedCamera:
-    """Shows a world at absolute times of its own clock.
+    """Shows a world at even times from its start.
 
     A frame that is asked for late still shows its own moment; frames are left out only when the
     camera is more than `MAX_LATENESS` behind, as a real one drops what nobody fetched.
@@ -52,7 +48,7 @@ class RenderedCamera:
         truth: Path | None = None,
         clock: HostClock = REAL_CLOCK,
     ) -> None:
-        """Start the camera's clock.
+        """Start the camera.
 
         Args:
             stage: What it looks at, and how.
@@ -82,9 +78,9 @@ class RenderedCamera:
         states = [self._world.state(float(moment)) for moment in moments]
         fault = fault_of(index, stage.look.faults, stage.area, self._timing.seed)
         image = render(stage, states, self._rng, fault)
-        stamp = self._stamp(exposed)
+        stamp = exposed + self._timing.latency
         self._write_truth(index, stamp, states[len(states) // 2])
-        return Frame(index, stamp, max(self._clock.now(), exposed + self._timing.latency), image)
+        return Frame(index, stamp, image)
 
     def close(self) -> None:
         """Close the file of truths."""
@@ -97,19 +93,10 @@ class RenderedCamera:
         behind = self._clock.now() - self._exposed(self._next) - self._timing.latency
         if behind <= MAX_LATENESS:
             return self._next
-        return self._next + int(np.ceil((behind - MAX_LATENESS) * self._rate))
-
-    @property
-    def _rate(self) -> float:
-        """Frames per second of this computer's clock."""
-        return self._timing.rate * (1.0 + self._timing.drift)
+        return self._next + int(np.ceil((behind - MAX_LATENESS) * self._timing.rate))
 
     def _exposed(self, index: int) -> float:
-        return self._start + index / self._rate
-
-    def _stamp(self, host: float) -> float:
-        ahead = (host - self._start) * self._timing.drift
-        return host + self._timing.offset + ahead
+        return self._start + index / self._timing.rate
 
     def _write_truth(self, index: int, stamp: float, state: WorldState) -> None:
         if self._file is None:

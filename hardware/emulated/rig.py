@@ -124,8 +124,7 @@ class RenderedView(NamedTuple):
         look = Look() if rig.stick.colour == "dark" else BRIGHT_STICK
         seed = 10 * self.seed + _SEEDS[self.view]
         stage = prepare(scene, camera_model(camera), look, seed)
-        # webcams start when they like
-        timing = Timing(rate=camera.rate, offset=1000.0 * _SEEDS[self.view], seed=seed)
+        timing = Timing(rate=camera.rate, seed=seed)
         truth = None if self.truth is None else self.truth / truth_file(self.view)
         return RenderedCamera(stage, self.world, timing, truth=truth)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,7 @@ class SessionSetup:
         """Of the plan [s]."""
         return sum(path.duration for path in self.plan)
 
+    @cached_property
     def guarded_rig(self) -> Rig:
         """The rig by whose limits the arm is guarded; wider ones in a rehearsal.
 
@@ -83,7 +85,7 @@ class SessionSetup:
     def assignment(self) -> Assignment:
         """What the control process is for."""
         return Assignment(
-            rig=self.guarded_rig(),
+            rig=self.guarded_rig,
             controller=self.controller,
             tool=self.tool,
             armed=self.armed,

@@ -49,7 +49,7 @@ class NoiseCamera:
             self._image = self._random.integers(0, 255, IMAGE_SIZE[::-1], dtype=np.uint8)
         self._index += 1
         now = time.monotonic()
-        return Frame(self._index, now, now, self._image)
+        return Frame(self._index, now, self._image)
 
     def close(self) -> None:
         """Nothing to let go."""

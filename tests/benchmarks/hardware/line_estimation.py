@@ -37,7 +37,7 @@ def pictures(view: str, count: int) -> list[Frame]:
         pivot = np.array([REACH * np.cos(0.3 * turn), REACH * np.sin(0.3 * turn), HEIGHT])
         fault = fault_of(at, LOOK.faults, stage.area, 0)
         state = WorldState(at / RATE, pivot, TILT * np.array([np.sin(turn), np.cos(turn)]))
-        frames.append(Frame(at, at / RATE, at / RATE, render(stage, [state] * 3, rng, fault)))
+        frames.append(Frame(at, at / RATE, render(stage, [state] * 3, rng, fault)))
     return frames
 
 

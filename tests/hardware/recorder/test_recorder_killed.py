@@ -48,7 +48,7 @@ def camera_of(view):
     stage = prepare(scene, camera_model(camera), Look(faults=0.02))
     time = ROBOT + host_time() + np.arange(-2.0, 40.0, 0.01)
     world = MovingWorld(*(CubicSpline(time, y) for y in motion(time)), offset=ROBOT)
-    return partial(RenderedCamera, stage, world, Timing(offset=50.0, seed=WHO[view]))
+    return partial(RenderedCamera, stage, world, Timing(seed=WHO[view]))
 
 
 class Sampler(threading.Thread):
