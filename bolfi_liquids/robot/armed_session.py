@@ -35,18 +35,6 @@ class Task(NamedTuple):
     about: str = ""
 
 
-class EmulatedRobot(NamedTuple):
-    """What to use in place of a robot.
-
-    Attributes:
-        rig: The arm and its cameras.
-        source: Where the data come from, for the recording.
-    """
-
-    rig: "EmulatedRig"
-    source: str
-
-
 EMULATED_VISCOSITY = 1.0  # Pa s, of a liquid of which nothing is said
 
 
@@ -75,7 +63,7 @@ def check_consent(ask: Ask | None, emulate: object, where: str) -> None:
 
 @contextmanager
 def armed_session(
-    task: Task, *, ask: Ask | None = None, emulation: EmulatedRobot | None = None
+    task: Task, *, ask: Ask | None = None, emulation: "EmulatedRig | None" = None
 ) -> "Iterator[Session]":
     """Ask a person, unless the arm is emulated; then a session that may move the arm.
 
@@ -93,8 +81,8 @@ def armed_session(
 
     check_consent(ask, emulation, "armed_session")
     if emulation is not None:
-        arm, make_cameras = emulation.rig
-        confirmation, source = None, emulation.source
+        arm, make_cameras, source = emulation
+        confirmation = None
     else:
         assert ask is not None
         text = f"{task.about}\n{describe(task.paths, task.rig, task.tool)}".lstrip()

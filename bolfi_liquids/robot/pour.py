@@ -12,7 +12,6 @@ from ..pouring.result import Pour
 from ..run.run import Run, RunOrPath
 from .armed_session import (
     Ask,
-    EmulatedRobot,
     Task,
     armed_session,
     check_consent,
@@ -143,10 +142,7 @@ def _carried_out(
 
     out = _next_directory(plan.chosen.run.path)
     task = Task(rig, "pouring", [plan.path], out, about=str(plan.chosen))
-    emulation = None
-    if emulate:
-        pouring = emulated(rig, plan.ready, tool="pouring")
-        emulation = EmulatedRobot(pouring, source="emulated UR arm")
+    emulation = emulated(rig, plan.ready, tool="pouring") if emulate else None
     try:
         with (
             armed_session(task, ask=ask, emulation=emulation) as session,

@@ -8,7 +8,6 @@ from ..errors import Argument, InputError
 from ..inputs.start import REST_TIME, SETTLING_TIME
 from .armed_session import (
     Ask,
-    EmulatedRobot,
     Task,
     armed_session,
 )
@@ -105,10 +104,7 @@ def stir_session(
     if emulate is None:
         _check_devices(rig)
         return armed_session(task, ask=ask)
-    emulation = EmulatedRobot(
-        emulated(rig, above_cup(rig), liquid=emulate, truth=out),
-        source=f"emulated UR arm and rendered cameras, viscosity {emulate.viscosity} Pa s",
-    )
+    emulation = emulated(rig, above_cup(rig), liquid=emulate, truth=out)
     return armed_session(task, ask=ask, emulation=emulation)
 
 

@@ -57,10 +57,12 @@ class EmulatedRig(NamedTuple):
     Attributes:
         controller: Opens the arm in the process that commands it.
         make_cameras: For each view, what opens its camera in the process that reads it.
+        source: Where the data come from, for the recording.
     """
 
     controller: EmulatedController
     make_cameras: dict[View, Callable[[], FrameSource]]
+    source: str
 
 
 def emulated(
@@ -89,13 +91,18 @@ def emulated(
     liquid = HiddenLiquid() if liquid is None else liquid
     joints, begun = _joints(rig, pose, tool), REAL_CLOCK.now()
     if tool == "pouring":
-        return EmulatedRig(EmulatedController(joints, begun, tool, liquid.seed), {})
+        controller = EmulatedController(joints, begun, tool, liquid.seed)
+        return EmulatedRig(controller, {}, "emulated UR arm")
     stir = None if liquid.stir is None else checked(liquid.stir)
     world = SharedWorld(begun, WorldState(0.0, pose[:3], np.zeros(2)))
     cameras: dict[View, Callable[[], FrameSource]] = {
         view: RenderedView(rig, view, world, liquid.seed, truth) for view in _SEEDS
     }
-    return EmulatedRig(EmulatedController(joints, begun, tool, liquid.seed, stir, world), cameras)
+    return EmulatedRig(
+        EmulatedController(joints, begun, tool, liquid.seed, stir, world),
+        cameras,
+        f"emulated UR arm and rendered cameras, viscosity {liquid.viscosity} Pa s",
+    )
 
 
 class RenderedView(NamedTuple):
