@@ -9,14 +9,14 @@ import numpy as np
 
 from ..arm import Tool
 from ..cameras.base import FrameSource
+from ..cameras.rendered import RenderedCamera, Timing
 from ..errors import RigError
 from ..host_clock import REAL_CLOCK
 from ..motion.cup_frame import cup_frame
 from ..motion.kinematics import inverse
 from ..recorder.names import truth_file
 from ..recorder.views import camera_model
-from ..rendering.shared_world import SharedWorld
-from ..rendering.world import WorldState
+from ..rendering import BRIGHT_STICK, Look, Scene, SharedWorld, WorldState, prepare
 from ..rig import Rig, View
 from ..safety.limits import workspace
 from .arm import EmulatedController
@@ -115,9 +115,6 @@ class RenderedView(NamedTuple):
     truth: Path | None
 
     def __call__(self) -> FrameSource:
-        from ..cameras.rendered import RenderedCamera, Timing
-        from ..rendering import BRIGHT_STICK, Look, Scene, prepare
-
         rig, camera = self.rig, self.rig.camera(self.view)
         scene = Scene(
             marker_offset=camera.marker,
