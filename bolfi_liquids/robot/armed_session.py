@@ -42,18 +42,6 @@ class Task(NamedTuple):
         return f"{self.about}\n{describe(self.paths, self.rig, self.tool)}".lstrip()
 
 
-class EmulatedRobot(NamedTuple):
-    """What to use in place of a robot.
-
-    Attributes:
-        rig: The arm and its cameras.
-        source: Where the data come from, for the recording.
-    """
-
-    rig: "EmulatedRig"
-    source: str
-
-
 EMULATED_VISCOSITY = 1.0  # Pa s, of a liquid of which nothing is said
 
 
@@ -81,7 +69,7 @@ def check_consent(ask: Ask | None, emulate: object, where: str) -> None:
 
 
 @contextmanager
-def armed_session(task: Task, by: Ask | EmulatedRobot) -> "Iterator[Session]":
+def armed_session(task: Task, by: "Ask | EmulatedRig") -> "Iterator[Session]":
     """Ask a person, unless the arm is emulated; then a session that may move the arm.
 
     Args:
@@ -92,11 +80,11 @@ def armed_session(task: Task, by: Ask | EmulatedRobot) -> "Iterator[Session]":
     Raises:
         RigError: The person did not agree, or something cannot be used.
     """
-    from ..hardware import Session, SessionSetup, confirm, webcams
+    from ..hardware import EmulatedRig, Session, SessionSetup, confirm, webcams
 
-    if isinstance(by, EmulatedRobot):
-        arm, make_cameras = by.rig
-        confirmation, source = None, by.source
+    if isinstance(by, EmulatedRig):
+        arm, make_cameras, source = by
+        confirmation = None
     else:
         arm, make_cameras, source = None, webcams(task.rig), "robot"
         text = task.describe()

@@ -18,7 +18,7 @@ from ..pouring.result import Judged, Pour
 from ..reporting.warnings import Results, warnings_of
 from ..run.run import RESULTS, Run, RunOrPath
 from ..wording import Sentence, at_most, spilled
-from .armed_session import Ask, EmulatedRobot, Task, armed_session, check_consent, dry_run
+from .armed_session import Ask, Task, armed_session, check_consent, dry_run
 from .live_view import SessionView
 
 if TYPE_CHECKING:
@@ -233,7 +233,7 @@ def _carried_out(plan: PourMotion, rig: "Rig", ask: Ask | None, progress: bool) 
     from ..hardware.motion import approach_pour
 
     task = plan.task(rig)
-    by = ask or EmulatedRobot(emulated(rig, plan.ready, tool="pouring"), source="emulated UR arm")
+    by = ask or emulated(rig, plan.ready, tool="pouring")
     try:
         with (
             armed_session(task, by) as session,

@@ -8,7 +8,6 @@ from ..errors import Argument, InputError
 from ..inputs.start import REST_TIME, SETTLING_TIME
 from .armed_session import (
     Ask,
-    EmulatedRobot,
     Task,
     armed_session,
 )
@@ -98,9 +97,7 @@ def stir_session(task: Task, by: "Ask | HiddenLiquid") -> "AbstractContextManage
     if not isinstance(by, HiddenLiquid):
         _check_devices(task.rig)
         return armed_session(task, by)
-    rig = emulated(task.rig, above_cup(task.rig), liquid=by, truth=task.out)
-    source = f"emulated UR arm and rendered cameras, viscosity {by.viscosity} Pa s"
-    return armed_session(task, EmulatedRobot(rig, source))
+    return armed_session(task, emulated(task.rig, above_cup(task.rig), liquid=by, truth=task.out))
 
 
 def _check_devices(rig: "Rig") -> None:

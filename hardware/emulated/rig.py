@@ -9,14 +9,14 @@ import numpy as np
 
 from ..arm import Tool
 from ..cameras.base import FrameSource
+from ..cameras.rendered import RenderedCamera, Timing
 from ..errors import RigError
 from ..host_clock import REAL_CLOCK
 from ..motion.cup_frame import cup_frame
 from ..motion.kinematics import inverse
 from ..recorder.names import truth_file
 from ..recorder.views import camera_model
-from ..rendering.shared_world import SharedWorld
-from ..rendering.world import WorldState
+from ..rendering import BRIGHT_STICK, Look, Scene, SharedWorld, WorldState, prepare
 from ..rig import Rig, View
 from ..safety.limits import workspace
 from .arm import EmulatedController
@@ -57,10 +57,12 @@ class EmulatedRig(NamedTuple):
     Attributes:
         controller: Opens the arm in the process that commands it.
         make_cameras: For each view, what opens its camera in the process that reads it.
+        source: Where the data come from, for the recording.
     """
 
     controller: EmulatedController
     make_cameras: dict[View, Callable[[], FrameSource]]
+    source: str
 
 
 def emulated(
@@ -89,13 +91,18 @@ def emulated(
     liquid = HiddenLiquid() if liquid is None else liquid
     joints, begun = _joints(rig, pose, tool), REAL_CLOCK.now()
     if tool == "pouring":
-        return EmulatedRig(EmulatedController(joints, begun, tool, liquid.seed), {})
+        controller = EmulatedController(joints, begun, tool, liquid.seed)
+        return EmulatedRig(controller, {}, "emulated UR arm")
     stir = None if liquid.stir is None else checked(liquid.stir)
     world = SharedWorld(begun, WorldState(0.0, pose[:3], np.zeros(2)))
     cameras: dict[View, Callable[[], FrameSource]] = {
         view: RenderedView(rig, view, world, liquid.seed, truth) for view in _SEEDS
     }
-    return EmulatedRig(EmulatedController(joints, begun, tool, liquid.seed, stir, world), cameras)
+    return EmulatedRig(
+        EmulatedController(joints, begun, tool, liquid.seed, stir, world),
+        cameras,
+        f"emulated UR arm and rendered cameras, viscosity {liquid.viscosity} Pa s",
+    )
 
 
 class RenderedView(NamedTuple):
@@ -108,9 +115,6 @@ class RenderedView(NamedTuple):
     truth: Path | None
 
     def __call__(self) -> FrameSource:
-        from ..cameras.rendered import RenderedCamera, Timing
-        from ..rendering import BRIGHT_STICK, Look, Scene, prepare
-
         rig, camera = self.rig, self.rig.camera(self.view)
         scene = Scene(
             marker_offset=camera.marker,

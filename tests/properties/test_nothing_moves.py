@@ -18,6 +18,7 @@ import numpy as np
 import pexpect
 import pytest
 import typer.main
+from bolfi_liquids.hardware.emulated.arm import EmulatedController
 from bolfi_liquids.hardware.session.confirmation import CONFIRMATION, Confirmation
 from pexpect.fdpexpect import fdspawn
 
@@ -293,11 +294,15 @@ class Lookalike(NamedTuple):
     emulated: bool = True
 
 
+class Derived(EmulatedController):
+    """It may open any arm."""
+
+
 def test_one_kind_of_arm_alone_moves_without_the_sentence(tmp_path):
     rig = hardware.bundled_rig()
     mine = hardware.emulated(rig, hardware.motion.above_cup(rig)).controller
     assert hardware.SessionSetup(rig, tmp_path, mine, armed=True).rehearsal
-    for other in (Lookalike(), hardware.URController("127.0.0.1"), None):
+    for other in (Lookalike(), Derived(*mine), hardware.URController("127.0.0.1"), None):
         with pytest.raises(ValueError, match="armed without a confirmation"):
             hardware.SessionSetup(rig, tmp_path, other, armed=True)
         # nor do its guards bear what only an emulated arm may bear
