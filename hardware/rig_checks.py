@@ -1,4 +1,4 @@
-"""What the numbers of a rig must be together: what the ends of each cannot tell.
+"""Contradictions between the numbers of a rig, each of which is within its ends.
 
 A stick hangs from a gripper that points down, a source cup is upright before it pours, and `start`
 are the joints that a person read off with the stick's pivot above the cup: they say independently
@@ -60,7 +60,7 @@ def clearance(rig: Rig) -> Clearance:
 
 
 def contradictions(rig: Rig) -> Faults:
-    """What cannot be true together; a later one may follow from the first.
+    """Contradictions in the order of checking; a later one may follow from an earlier one.
 
     Args:
         rig: Whose numbers are each within their ends.
@@ -81,7 +81,7 @@ def contradictions(rig: Rig) -> Faults:
 
 
 def receiver_fault(rig: Rig, radius: float) -> str:
-    """How a receiver stands in the stirred cup; empty where it stands beside it.
+    """Message if a receiver overlaps the stirred cup, else an empty string.
 
     Args:
         rig: Says where both stand.
@@ -98,7 +98,7 @@ def receiver_fault(rig: Rig, radius: float) -> str:
 
 
 def _sections(rig: Rig) -> Faults:
-    """What cannot be true within one section."""
+    """Contradictions within one section."""
     robot, cup, stick = rig.robot, rig.cup, rig.stick
     if (base := CONTROLLER_RATE[robot.controller]) % robot.rate:
         what = f"rate {robot.rate:g} Hz does not divide the controller's {base:g} Hz; use 125"

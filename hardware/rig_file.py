@@ -53,7 +53,7 @@ def checked_rig(rig: Rig, where: str = "rig") -> Rig:
 
 
 def _checked(written: dict[str, Any], where: str) -> Rig:
-    """The rig of a file's content, all of whose fields are known, there, and as they should be."""
+    """Rig of a file's content, after all checks."""
     faults = list(_unknown(Rig, written))
     try:
         rig = Rig.model_validate(written)
@@ -67,7 +67,7 @@ def _checked(written: dict[str, Any], where: str) -> Rig:
 
 
 def _refusal(faults: list[Fault], where: str) -> RigError:
-    """Of one fault, or of several that do not follow from each other."""
+    """Error that names one fault, or several independent ones."""
     if len(faults) == 1:
         field, what, fix = faults[0]
         return RigError(what, where=f"{where}: {field}" if field else where, fix=fix)
@@ -76,7 +76,7 @@ def _refusal(faults: list[Fault], where: str) -> RigError:
 
 
 def _mistyped(err: ValidationError) -> Iterator[Fault]:
-    """What is missing or of another type."""
+    """Missing fields, and fields of a wrong type."""
     for one in err.errors(include_url=False, include_context=False):
         message, given = one["msg"].removeprefix("Value error, "), one["input"]
         what = message if isinstance(given, dict) else f"{message}, got {given!r:.60}"
@@ -84,7 +84,7 @@ def _mistyped(err: ValidationError) -> Iterator[Fault]:
 
 
 def _unknown(kind: type[RigSection], written: Any, way: str = "") -> Iterator[Fault]:
-    """Fields that a section does not have, each with the likeliest that it has."""
+    """Unknown fields, each with the most similar known one."""
     for name, value in written.items() if isinstance(written, dict) else ():
         if name in kind.model_fields:
             yield from _unknown_within(kind.model_fields[name].annotation, value, f"{way}{name}")

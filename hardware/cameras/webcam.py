@@ -58,7 +58,7 @@ class Webcam:
             raise
 
     def read(self) -> Frame | None:
-        """The next frame that the driver has not kept: only of such a one the time is known.
+        """Wait for the next frame; frames that the driver kept are skipped, their time is unknown.
 
         Raises:
             CameraError: the camera stopped to deliver.
