@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from .errors import RigError
 from .rig import Rig
 from .rig_checks import contradictions
-from .rig_numbers import COMPARE, Fault, RigSection, beyond_their_ends
+from .rig_numbers import COMPARE, RigFault, RigSection, beyond_their_ends
 
 BUNDLED = "rig.toml"
 
@@ -66,7 +66,7 @@ def _checked(written: dict[str, Any], where: str) -> Rig:
     return rig
 
 
-def _refusal(faults: list[Fault], where: str) -> RigError:
+def _refusal(faults: list[RigFault], where: str) -> RigError:
     """Error that names one fault, or several independent ones."""
     if len(faults) == 1:
         field, what, fix = faults[0]
@@ -75,15 +75,15 @@ def _refusal(faults: list[Fault], where: str) -> RigError:
     return RigError(told, where=where, fix=COMPARE)
 
 
-def _mistyped(err: ValidationError) -> Iterator[Fault]:
+def _mistyped(err: ValidationError) -> Iterator[RigFault]:
     """Missing fields, and fields of a wrong type."""
     for one in err.errors(include_url=False, include_context=False):
         message, given = one["msg"].removeprefix("Value error, "), one["input"]
         what = message if isinstance(given, dict) else f"{message}, got {given!r:.60}"
-        yield Fault(".".join(map(str, one["loc"])), what)
+        yield RigFault(".".join(map(str, one["loc"])), what)
 
 
-def _unknown(kind: type[RigSection], written: Any, way: str = "") -> Iterator[Fault]:
+def _unknown(kind: type[RigSection], written: Any, way: str = "") -> Iterator[RigFault]:
     """Unknown fields, each with the most similar known one."""
     for name, value in written.items() if isinstance(written, dict) else ():
         if name in kind.model_fields:
@@ -91,10 +91,10 @@ def _unknown(kind: type[RigSection], written: Any, way: str = "") -> Iterator[Fa
             continue
         likely = get_close_matches(name, kind.model_fields, n=1)
         hint = f"did you mean {likely[0]}?" if likely else f"known: {', '.join(kind.model_fields)}"
-        yield Fault(f"{way}{name}", f"no such field ({hint})")
+        yield RigFault(f"{way}{name}", f"no such field ({hint})")
 
 
-def _unknown_within(annotation: Any, written: Any, name: str) -> Iterator[Fault]:
+def _unknown_within(annotation: Any, written: Any, name: str) -> Iterator[RigFault]:
     if isinstance(annotation, type) and issubclass(annotation, RigSection):
         yield from _unknown(annotation, written, f"{name}.")
     elif isinstance(written, list | tuple):

@@ -18,7 +18,7 @@ class RigSection(BaseModel, frozen=True, allow_inf_nan=False):
     """Part of a rig.toml; no change after reading."""
 
 
-class Fault(NamedTuple):
+class RigFault(NamedTuple):
     """A fault of a rig.
 
     Attributes:
@@ -98,10 +98,10 @@ def _numbers(
         yield name, value, next((one for one in metadata if isinstance(one, Within)), None)
 
 
-def beyond_their_ends(section: RigSection) -> list[Fault]:
+def beyond_their_ends(section: RigSection) -> list[RigFault]:
     """Faults of all numbers outside of their ends."""
     return [
-        Fault(name, ends.message(value))
+        RigFault(name, ends.message(value))
         for name, value, ends in numbers(section)
         if ends is not None and not ends.low <= value <= ends.high
     ]
