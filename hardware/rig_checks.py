@@ -1,4 +1,4 @@
-"""What the numbers of a rig must be together: what the ends of each cannot tell.
+"""Contradictions between the numbers of a rig, each of which is within its ends.
 
 A stick hangs from a gripper that points down, a source cup is upright before it pours, and `start`
 are the joints that a person read off with the stick's pivot above the cup: they say independently
@@ -15,7 +15,7 @@ from .motion.kinematics import forward, inverse
 from .motion.poses import rotation_matrix
 from .motion.stir_paths import above_cup
 from .rig import MIN_CUP_RADIUS, AxisLimits, Camera, Rig
-from .rig_numbers import Fault
+from .rig_numbers import RigFault
 from .safety.limits import MAX_TILT, Workspace, workspace
 
 CONTROLLER_RATE = {"cb3": 125.0, "e-series": 500.0}  # Hz; others are rounded by the controller
@@ -35,7 +35,7 @@ MAX_MARKER_AWAY = 0.15  # m, of a marker on the gripper from the stick's pivot
 MAX_VIEW = np.radians(60.0)  # of a pivot from the middle of a picture; where the lens is measured
 MAX_START_AWAY = 0.04  # m, of the pivot at `start` from its place above the cup; a cup is as wide
 
-Faults = Iterator[Fault]
+Faults = Iterator[RigFault]
 
 
 class Clearance(NamedTuple):
@@ -60,7 +60,7 @@ def clearance(rig: Rig) -> Clearance:
 
 
 def contradictions(rig: Rig) -> Faults:
-    """What cannot be true together; a later one may follow from the first.
+    """Contradictions in the order of checking; a later one may follow from an earlier one.
 
     Args:
         rig: Whose numbers are each within their ends.
@@ -71,7 +71,7 @@ def contradictions(rig: Rig) -> Faults:
     yield from _stick(rig)
     yield from _heights(rig)
     if fault := receiver_fault(rig, MIN_CUP_RADIUS):
-        yield Fault("", fault)
+        yield RigFault("", fault)
     for number, camera in enumerate(rig.cameras):
         yield from _camera(rig, camera, f"cameras.{number}")
     yield from _tracking(rig)
@@ -81,7 +81,7 @@ def contradictions(rig: Rig) -> Faults:
 
 
 def receiver_fault(rig: Rig, radius: float) -> str:
-    """How a receiver stands in the stirred cup; empty where it stands beside it.
+    """Message if a receiver overlaps the stirred cup, else an empty string.
 
     Args:
         rig: Says where both stand.
@@ -98,31 +98,31 @@ def receiver_fault(rig: Rig, radius: float) -> str:
 
 
 def _sections(rig: Rig) -> Faults:
-    """What cannot be true within one section."""
+    """Contradictions within one section."""
     robot, cup, stick = rig.robot, rig.cup, rig.stick
     if (base := CONTROLLER_RATE[robot.controller]) % robot.rate:
         what = f"rate {robot.rate:g} Hz does not divide the controller's {base:g} Hz; use 125"
-        yield Fault("robot", what)
+        yield RigFault("robot", what)
     if cup.fill >= cup.height:
-        yield Fault("cup", f"fill {cup.fill} m is not below height {cup.height} m")
+        yield RigFault("cup", f"fill {cup.fill} m is not below height {cup.height} m")
     if stick.density > MAX_STICK_DENSITY:
-        yield Fault("stick", f"mass {stick.mass:g} kg looks like grams; convert it to kg")
+        yield RigFault("stick", f"mass {stick.mass:g} kg looks like grams; convert it to kg")
     if stick.density < MIN_STICK_DENSITY:
         what = (
             f"mass {stick.mass:g} kg is a density of {stick.density:.3g} kg/m3, which no stick "
             f"has (at least {MIN_STICK_DENSITY:g}); weigh it in kg"
         )
-        yield Fault("stick", what)
+        yield RigFault("stick", what)
     if (points := rig.stirring.points) % 2 == 0:
         what = f"{points} is even: all strokes would lie on one line; give an odd number"
-        yield Fault("stirring.points", what)
+        yield RigFault("stirring.points", what)
     yield from _boxes(rig)
     for number, camera in enumerate(rig.cameras):
         if camera.intrinsics is None and camera.focal_length is None:
-            yield Fault(f"cameras.{number}", "neither intrinsics nor focal_length is given")
+            yield RigFault(f"cameras.{number}", "neither intrinsics nor focal_length is given")
         if np.linalg.norm(np.subtract(camera.target, camera.position)) < MIN_LOOK:
             what = f"position and target are less than {MIN_LOOK:g} m apart"
-            yield Fault(f"cameras.{number}", what)
+            yield RigFault(f"cameras.{number}", what)
 
 
 def _boxes(rig: Rig) -> Faults:
@@ -131,27 +131,27 @@ def _boxes(rig: Rig) -> Faults:
         for axis in ("x", "y", "z"):
             (low, high), (least, largest) = getattr(box, axis), getattr(most, axis)
             if not low < high:
-                yield Fault(f"limits.{name}", f"{axis} must ascend, got [{low}, {high}]")
+                yield RigFault(f"limits.{name}", f"{axis} must ascend, got [{low}, {high}]")
             if low < least or high > largest:
                 what = (
                     f"{name}.{axis} [{low}, {high}] m is not within [{least}, {largest}] m, "
                     "where an arm may be let go at most"
                 )
-                yield Fault("limits", what)
+                yield RigFault("limits", what)
 
 
 def _cameras_apart(rig: Rig) -> Faults:
     first, second = rig.cameras
     if first.source == second.source and first.is_device:
         what = f"cameras: both have the source {first.source!r}; each needs its own"
-        yield Fault("", what)
+        yield RigFault("", what)
     slowest = min(first.rate, second.rate)
     if rig.limits.frame_age < 1.0 / slowest:
         what = (
             f"limits.frame_age {rig.limits.frame_age} s is below the {1.0 / slowest:.3g} s from "
             "one picture of a camera to the next"
         )
-        yield Fault("", what)
+        yield RigFault("", what)
 
 
 def _speeds(rig: Rig) -> Faults:
@@ -164,7 +164,7 @@ def _speeds(rig: Rig) -> Faults:
     )
     for name, value, limit, unit in limited:
         if value > (most := getattr(limits, limit)):
-            yield Fault("", f"{name} {value} {unit} is above limits.{limit} {most} {unit}")
+            yield RigFault("", f"{name} {value} {unit} is above limits.{limit} {most} {unit}")
 
 
 def _stick(rig: Rig) -> Faults:
@@ -175,19 +175,19 @@ def _stick(rig: Rig) -> Faults:
             f"stirring.height: the stick's tip is {tip:.3f} m above the floor, "
             f"outside the liquid (cup.fill = {cup.fill} m)"
         )
-        yield Fault("", what)
+        yield RigFault("", what)
     if stirring.radius + stick.radius >= cup.radius:
         what = (
             f"stirring.radius {stirring.radius} m brings the stick to the cup's wall "
             f"(cup.radius = {cup.radius} m)"
         )
-        yield Fault("", what)
+        yield RigFault("", what)
     if stick.mass >= rig.robot.payload:
         what = (
             f"stick.mass {stick.mass} kg is not below robot.payload {rig.robot.payload} kg, of "
             "which the stick is a part"
         )
-        yield Fault("", what)
+        yield RigFault("", what)
     wet = cup.fill - tip
     lifted = rig.liquid.density * np.pi * stick.radius**2 * wet * (stick.length - wet / 2)
     if lifted >= stick.mass * stick.length / 2:  # moments about the pivot
@@ -195,7 +195,7 @@ def _stick(rig: Rig) -> Faults:
             f"stick.mass {stick.mass} kg: the stick floats up in a liquid of "
             f"{rig.liquid.density:g} kg/m3 (liquid.density); it must hang"
         )
-        yield Fault("", what)
+        yield RigFault("", what)
 
 
 def _heights(rig: Rig) -> Faults:
@@ -205,27 +205,27 @@ def _heights(rig: Rig) -> Faults:
             f"limits.stirring.z {z[0]} m lets the stick's tip reach the "
             f"cup's floor (stick.length = {stick.length} m)"
         )
-        yield Fault("", what)
+        yield RigFault("", what)
     if stirring.clear_height - stick.length <= rig.cup.height:
         what = f"stirring.clear_height {stirring.clear_height} m leaves the stick in the cup"
-        yield Fault("", what)
+        yield RigFault("", what)
     for name in ("height", "clear_height"):
         height = getattr(stirring, name)
         if not z[0] <= height <= z[1]:
             what = f"stirring.{name} {height} m is outside of limits.stirring.z {list(z)} m"
-            yield Fault("", what)
+            yield RigFault("", what)
 
 
 def _camera(rig: Rig, camera: Camera, name: str) -> Faults:
     position, pivot = np.array(camera.position), np.array([0.0, 0.0, rig.stirring.height])
     if np.hypot(*position[:2]) <= rig.cup.radius:
-        yield Fault(
+        yield RigFault(
             f"{name}.position",
             f"{list(camera.position)} m is on the cup's axis, or nearer to it than its wall",
             "measure it again, in the cup's frame: from the centre of its floor, z upwards",
         )
     if (away := float(np.linalg.norm(camera.marker))) > MAX_MARKER_AWAY:
-        yield Fault(
+        yield RigFault(
             f"{name}.marker",
             f"{list(camera.marker)} m is {away:.2f} m from the stick's pivot",
             f"measure it again, from the pivot: {MAX_MARKER_AWAY} m at the most",
@@ -236,7 +236,7 @@ def _camera(rig: Rig, camera: Camera, name: str) -> Faults:
     if camera.intrinsics is None and camera.focal_length is not None:
         view = float(np.arctan(np.hypot(camera.width, camera.height) / 2.0 / camera.focal_length))
     if angle > view:
-        yield Fault(
+        yield RigFault(
             f"{name}.target",
             f"the stick's pivot is {np.degrees(angle):.0f} deg from the middle of the picture, and "
             f"may be {np.degrees(view):.0f} deg",
@@ -248,7 +248,7 @@ def _tracking(rig: Rig) -> Faults:
     """An arm lags along its way, which is level while it stirs."""
     aside = clearance(rig).aside
     if rig.limits.tracking_error >= aside:
-        yield Fault(
+        yield RigFault(
             "limits.tracking_error",
             f"{1e3 * rig.limits.tracking_error:.1f} mm, and the stick comes within "
             f"{1e3 * aside:.1f} mm of the cup's wall (cup.radius, stick.radius, stirring.radius)",
@@ -260,7 +260,7 @@ def _stirring_tool(space: Workspace) -> Faults:
     for name, turn in _turns(space).items():
         tilt = _angle(turn[:, 2], (0.0, 0.0, -1.0))
         if tilt > MAX_TILT["stirring"]:
-            yield Fault(
+            yield RigFault(
                 "robot.stirring_orientation",
                 f"with it the {name} points {np.degrees(tilt):.0f} deg away from straight down",
                 "correct it or the turn in robot.stirring_tcp: the stick hangs from it",
@@ -271,7 +271,7 @@ def _source_cup(rig: Rig, space: Workspace) -> Faults:
     flange = _turns(space)["flange"]
     tilt = abs(np.arcsin(np.clip(flange[2, 2], -1.0, 1.0)))
     if tilt > LEVEL_TILT:
-        yield Fault(
+        yield RigFault(
             "robot.pouring_orientation",
             f"with it the flange points {np.degrees(tilt):.0f} deg away from level",
             "correct it or the turn in robot.pouring_tcp: the cup is held from a side",
@@ -281,7 +281,7 @@ def _source_cup(rig: Rig, space: Workspace) -> Faults:
     ahead = float(lip @ (np.cos(heading), np.sin(heading), 0.0))
     for value, side in ((float(lip[2]), "above"), (ahead, "on the receiver's side of")):
         if value < LIP_AWAY:
-            yield Fault(
+            yield RigFault(
                 "robot.pouring_tcp",
                 f"with it the source's lip is {1e3 * value:.0f} mm {side} the gripper's axis, not "
                 f"{1e3 * LIP_AWAY:.0f} mm or more",
@@ -293,7 +293,7 @@ def _source_cup(rig: Rig, space: Workspace) -> Faults:
 def _start(rig: Rig, space: Workspace) -> Faults:
     goal = cup_frame(rig.cup).to_base(above_cup(rig))
     if inverse(space.arm, goal, space.start, tcp=space.tcp).status == "unreachable":
-        yield Fault(
+        yield RigFault(
             "cup.position",
             f"{list(rig.cup.position)} m: the arm does not reach the place above the cup",
             "correct it, or place the cup nearer to the robot",
@@ -304,7 +304,7 @@ def _start(rig: Rig, space: Workspace) -> Faults:
     # two places of the cup that differ by more than the stick's clearance cannot both be safe
     wall, floor = np.minimum(clearance(rig), MAX_START_AWAY)
     if aside > wall or along > floor or tilt > MAX_TILT["stirring"]:
-        yield Fault(
+        yield RigFault(
             "robot.start",
             f"these joints put the stick's pivot {1e3 * aside:.1f} mm aside of its place above the "
             f"cup (cup.position, stirring.clear_height), {1e3 * along:.1f} mm from its height and "

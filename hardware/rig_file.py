@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from .errors import RigError
 from .rig import Rig
 from .rig_checks import contradictions
-from .rig_numbers import COMPARE, Fault, RigSection, beyond_their_ends
+from .rig_numbers import COMPARE, RigFault, RigSection, beyond_their_ends
 
 BUNDLED = "rig.toml"
 
@@ -53,7 +53,7 @@ def checked_rig(rig: Rig, where: str = "rig") -> Rig:
 
 
 def _checked(written: dict[str, Any], where: str) -> Rig:
-    """The rig of a file's content, all of whose fields are known, there, and as they should be."""
+    """Rig of a file's content, after all checks."""
     faults = list(_unknown(Rig, written))
     try:
         rig = Rig.model_validate(written)
@@ -66,8 +66,8 @@ def _checked(written: dict[str, Any], where: str) -> Rig:
     return rig
 
 
-def _refusal(faults: list[Fault], where: str) -> RigError:
-    """Of one fault, or of several that do not follow from each other."""
+def _refusal(faults: list[RigFault], where: str) -> RigError:
+    """Error that names one fault, or several independent ones."""
     if len(faults) == 1:
         field, what, fix = faults[0]
         return RigError(what, where=f"{where}: {field}" if field else where, fix=fix)
@@ -75,26 +75,26 @@ def _refusal(faults: list[Fault], where: str) -> RigError:
     return RigError(told, where=where, fix=COMPARE)
 
 
-def _mistyped(err: ValidationError) -> Iterator[Fault]:
-    """What is missing or of another type."""
+def _mistyped(err: ValidationError) -> Iterator[RigFault]:
+    """Missing fields, and fields of a wrong type."""
     for one in err.errors(include_url=False, include_context=False):
         message, given = one["msg"].removeprefix("Value error, "), one["input"]
         what = message if isinstance(given, dict) else f"{message}, got {given!r:.60}"
-        yield Fault(".".join(map(str, one["loc"])), what)
+        yield RigFault(".".join(map(str, one["loc"])), what)
 
 
-def _unknown(kind: type[RigSection], written: Any, way: str = "") -> Iterator[Fault]:
-    """Fields that a section does not have, each with the likeliest that it has."""
+def _unknown(kind: type[RigSection], written: Any, way: str = "") -> Iterator[RigFault]:
+    """Unknown fields, each with the most similar known one."""
     for name, value in written.items() if isinstance(written, dict) else ():
         if name in kind.model_fields:
             yield from _unknown_within(kind.model_fields[name].annotation, value, f"{way}{name}")
             continue
         likely = get_close_matches(name, kind.model_fields, n=1)
         hint = f"did you mean {likely[0]}?" if likely else f"known: {', '.join(kind.model_fields)}"
-        yield Fault(f"{way}{name}", f"no such field ({hint})")
+        yield RigFault(f"{way}{name}", f"no such field ({hint})")
 
 
-def _unknown_within(annotation: Any, written: Any, name: str) -> Iterator[Fault]:
+def _unknown_within(annotation: Any, written: Any, name: str) -> Iterator[RigFault]:
     if isinstance(annotation, type) and issubclass(annotation, RigSection):
         yield from _unknown(annotation, written, f"{name}.")
     elif isinstance(written, list | tuple):

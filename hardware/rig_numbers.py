@@ -18,13 +18,13 @@ class RigSection(BaseModel, frozen=True, allow_inf_nan=False):
     """Part of a rig.toml; no change after reading."""
 
 
-class Fault(NamedTuple):
-    """What is wrong with a rig.
+class RigFault(NamedTuple):
+    """A fault of a rig.
 
     Attributes:
-        field: As `robot.host`; empty for what no single one is at fault of.
-        what: Is wrong with it.
-        fix: What to do about it.
+        field: Such as `robot.host`; empty if several fields are involved.
+        what: Description, with the values.
+        fix: Cure.
     """
 
     field: str
@@ -34,15 +34,15 @@ class Fault(NamedTuple):
 
 @dataclass(frozen=True)
 class Within:
-    """Ends of a number, both allowed; the annotation of its field."""
+    """Ends of a number, both allowed, its unit and the reason; annotates the number's field."""
 
     low: float
     high: float
     unit: str
     why: str
 
-    def told(self, value: float) -> str:
-        """That a value is none of these, and why."""
+    def message(self, value: float) -> str:
+        """Message for a value outside of the ends."""
         unit = f" {self.unit}".rstrip()
         return f"{value:g}{unit} is not within {self.low:g} to {self.high:g}{unit}: {self.why}"
 
@@ -81,7 +81,7 @@ Balance = tuple[Aside, Aside, MountedAhead]
 
 
 def numbers(section: RigSection, way: str = "") -> Iterator[tuple[str, float, Within | None]]:
-    """Each number of a section and of those in it: its field, its value and its ends."""
+    """Field, value and ends of each number of a section and of the sections in it."""
     for name, field in type(section).model_fields.items():
         yield from _numbers(getattr(section, name), field.annotation, field.metadata, way + name)
 
@@ -98,10 +98,10 @@ def _numbers(
         yield name, value, next((one for one in metadata if isinstance(one, Within)), None)
 
 
-def beyond_their_ends(section: RigSection) -> list[Fault]:
-    """The numbers that are not within their ends."""
+def beyond_their_ends(section: RigSection) -> list[RigFault]:
+    """Faults of all numbers outside of their ends."""
     return [
-        Fault(name, ends.told(value))
+        RigFault(name, ends.message(value))
         for name, value, ends in numbers(section)
         if ends is not None and not ends.low <= value <= ends.high
     ]

@@ -27,9 +27,9 @@ CAMERAS = "UR arm and two cameras, by bolfi-liquids"
 def finalise(directory: str | Path) -> Path:
     """Make the recording of a session; it may have been killed at any time.
 
-    The marker on the gripper tells the delay between each camera and the robot, both views are
-    joined, and the stir is cut out and resampled at 30 Hz ("To Stir or Not to Stir"). The file
-    is written whole or not at all; an earlier one is replaced.
+    The marker on the gripper tells the delay of each camera, both views are joined, and the stir
+    is cut out and resampled at 30 Hz ("To Stir or Not to Stir"). The file is written whole or not
+    at all; an earlier one is replaced.
 
     Args:
         directory: Of the session.
@@ -98,14 +98,13 @@ def _attributes(directory: Path, raw: Raw, stir: Stir) -> dict[str, float | int 
         for name, value in zip(("p50", "p99", "max"), late, strict=True)
     }
     for view in VIEWS:
-        frames, clock = raw.frames[view], stir.clocks[view]
+        frames, found = raw.frames[view], stir.delays[view]
         doubtful = (frames["flags"].astype(np.int64) & int(BAD_LINE)) != 0
         numbers = {
-            "clock_offset": clock.offset,
-            "clock_offset_error": clock.offset_error,
-            "clock_drift": clock.drift,
-            "marker_residual_px": clock.residual,
-            "marker_misfit_px": clock.misfit,
+            "delay": found.delay,
+            "delay_error": found.error,
+            "marker_residual_px": found.residual,
+            "marker_misfit_px": found.misfit,
             "flagged": float(doubtful.mean()),
             "frame_rate": _rate(frames["stamp"]),
             "lost_frames": max(lost_rows(frames["index"]), missed(frames["stamp"])),

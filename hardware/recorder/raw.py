@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..errors import RigError
 from ..rig import View
+from ..safety.guards import MAX_CLOCK_DRIFT
 from ..vision.frame_measurement import FrameMeasurement
 from .csv_file import read_csv
 from .directory import VIEWS, Provenance, read_provenance
@@ -26,7 +27,8 @@ class Raw(NamedTuple):
     Attributes:
         provenance: Of the session.
         samples: Columns of samples.csv, times rising.
-        frames: Columns of each view's frames up to its first fault, stamps rising.
+        frames: Columns of each view's frames up to its first fault; stamps on the robot's clock,
+            rising.
         lost_samples: Rows that the control process took and samples.csv lacks.
         faults: Why a view's later frames cannot be used; empty where nothing is wrong.
     """
@@ -57,7 +59,29 @@ def read_raw(directory: Path) -> Raw:
     counts = {SAMPLES: len(samples["time"])}
     counts |= {frames_file(view): len(frames[view]["stamp"]) for view in VIEWS}
     _check_enough(directory, counts, [f"view {view}: {one}" for view, one in faults.items() if one])
+    for of in frames.values():
+        of["stamp"] = robot_time(of["stamp"], samples["host"], samples["time"])
     return Raw(provenance, samples, frames, lost_rows(rows["index"]), faults)
+
+
+def robot_time(
+    stamp: NDArray[np.float64], host: NDArray[np.float64], time: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Times of this computer's clock [s], on the robot's clock [s].
+
+    The clocks differ by a constant and a drift: a line through the samples, robust to those that
+    were read late, by the median slope of pairs half the samples apart.
+
+    Args:
+        stamp: To be converted.
+        host: When each sample was read, shape (N,).
+        time: Of each sample on the robot's clock, shape (N,).
+    """
+    half = len(time) // 2
+    rates = (time[half:] - time[: len(time) - half]) / (host[half:] - host[: len(host) - half])
+    rate = float(np.clip(np.median(rates), 1.0 - MAX_CLOCK_DRIFT, 1.0 + MAX_CLOCK_DRIFT))
+    origin = host[half]
+    return rate * (stamp - origin) + np.median(time - rate * (host - origin))
 
 
 def lost_rows(index: NDArray[np.float64]) -> int:

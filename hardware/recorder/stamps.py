@@ -7,7 +7,7 @@ MAX_STEP = 0.5  # [s] between two pictures; no camera is as slow
 
 
 def stamp_fault(step: float, index: int, after: float) -> str:
-    """What is wrong with a picture's stamp, and the cure; empty where nothing is.
+    """Message for a stamp that does not follow the one before it, else an empty string.
 
     Args:
         step: Its stamp less the one before it [s].
@@ -26,7 +26,7 @@ def stamp_fault(step: float, index: int, after: float) -> str:
 def first_fault(
     index: NDArray[np.float64], stamp: NDArray[np.float64], begin: float
 ) -> tuple[int, str]:
-    """First row whose stamp cannot be used, and why; (N, "") where there is none.
+    """First row whose stamp is refused, and the message; (N, "") if there is none.
 
     Args:
         index: Of the pictures, shape (N,).

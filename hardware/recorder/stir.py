@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..errors import RigError
 from ..motion.trajectory import Trajectory
 from ..rig import View
-from ..vision.clock import Clock, ClockError, fit_clock
+from ..vision.delay import Delay, DelayError, fit_delay
 from ..vision.frame_measurement import BAD_LINE
 from ..vision.joined_views import MeasuredView, join
 from ..vision.measurement_series import FrameSeries, frame_series
@@ -16,7 +16,7 @@ from .directory import VIEWS
 from .raw import Columns, Raw
 
 TABLE_RATE = 30.0  # of the table [1/s]; the cameras' in "To Stir or Not to Stir"
-CLOCK_MARGIN = 1.0  # [s] before and after the stir that the clocks are learned from, too
+DELAY_MARGIN = 1.0  # [s] before and after the stir that the delays are learned from, too
 LONGEST_GAP = 0.1  # [s] without a sample of the robot, over which nothing is interpolated
 MOST_GAP = 0.2  # [s]; a recording ends at a longer one, since a simulator needs the way
 LEAST_TIME = 1.0  # [s] of a stir
@@ -32,7 +32,7 @@ class Stir(NamedTuple):
         error: Standard errors of the inclination [rad], shape (T, 2).
         flags: Why there is no inclination, as `Flag`; shape (T,).
         origin: The robot's time at `time` 0 [s].
-        clocks: Of the cameras.
+        delays: Of the cameras.
         cut: Why it ends before the last sample of the stir; empty where it does not.
     """
 
@@ -42,7 +42,7 @@ class Stir(NamedTuple):
     error: NDArray[np.float64]
     flags: NDArray[np.int64]
     origin: float
-    clocks: dict[View, Clock]
+    delays: dict[View, Delay]
     cut: str
 
 
@@ -55,7 +55,7 @@ class Span(NamedTuple):
 
 
 def extract_stir(raw: Raw, where: str, until: float = np.inf) -> Stir:
-    """Cut out the stir, bring the cameras to the robot's clock, and join both views.
+    """Cut out the stir, find the delays of the cameras, and join both views.
 
     Args:
         raw: Of a session.
@@ -63,18 +63,18 @@ def extract_stir(raw: Raw, where: str, until: float = np.inf) -> Stir:
         until: Take nothing after this time of the robot's clock [s].
 
     Raises:
-        RigError: There is no stir, it is too short, or a camera's clock cannot be found.
+        RigError: There is no stir, it is too short, or a camera's delay cannot be found.
     """
     span = _stirred(raw.samples, where, until)
     _check_length(span, where)
     series = {view: frame_series(raw.frames[view]) for view in VIEWS}
-    clocks: dict[View, Clock] = {view: _clock(raw, view, span) for view in VIEWS}
+    delays: dict[View, Delay] = {view: _delay(raw, view, span) for view in VIEWS}
     for view in VIEWS:
-        span = _seen(span, series[view], clocks[view], f"view {view}", raw.faults[view])
+        span = _seen(span, series[view], delays[view].delay, f"view {view}", raw.faults[view])
     _check_length(span, where)
     time = np.arange(np.floor((span.last - span.first) * TABLE_RATE + 1e-6) + 1) / TABLE_RATE
     times = span.first + time
-    xz, yz = (MeasuredView(series[v], clocks[v], raw.provenance.cameras[v]) for v in VIEWS)
+    xz, yz = (MeasuredView(series[v], delays[v].delay, raw.provenance.cameras[v]) for v in VIEWS)
     joined = join(xz, yz, times)
     position = [np.interp(times, raw.samples["time"], raw.samples[axis]) for axis in "xyz"]
     unknown = _in_gap(raw.samples["time"], times)
@@ -85,7 +85,7 @@ def extract_stir(raw: Raw, where: str, until: float = np.inf) -> Stir:
         error=joined.error,
         flags=joined.flags,
         origin=span.first,
-        clocks=clocks,
+        delays=delays,
         cut=span.cut,
     )
 
@@ -118,30 +118,29 @@ def _stirred(samples: Columns, where: str, until: float) -> Span:
 
 
 def _way_near(samples: Columns, span: Span) -> Trajectory:
-    """The gripper's positions that the clocks of a stir are learned from."""
-    near = (samples["time"] > span.first - CLOCK_MARGIN) & (
-        samples["time"] < span.last + CLOCK_MARGIN
+    """The gripper's positions that the delays are learned from."""
+    near = (samples["time"] > span.first - DELAY_MARGIN) & (
+        samples["time"] < span.last + DELAY_MARGIN
     )
     path = np.column_stack([samples[axis][near] for axis in "xyz"])
     return Trajectory(samples["time"][near], path)
 
 
-def _clock(raw: Raw, view: View, span: Span) -> Clock:
-    """The clock of a camera.
+def _delay(raw: Raw, view: View, span: Span) -> Delay:
+    """Delay of a camera.
 
     Raises:
         RigError: It cannot be found.
     """
-    samples, fault = raw.samples, raw.faults[view]
+    fault = raw.faults[view]
     try:
-        return fit_clock(
+        return fit_delay(
             frame_series(raw.frames[view]),
-            _way_near(samples, span),
+            _way_near(raw.samples, span),
             raw.provenance.cameras[view],
             raw.provenance.rig.camera(view).marker,
-            guess=float(np.median(samples["time"] - samples["host"])),
         )
-    except ClockError as err:
+    except DelayError as err:
         raise RigError(
             f"{err}; {fault}" if fault else str(err),
             where=f"view {view}",
@@ -149,10 +148,10 @@ def _clock(raw: Raw, view: View, span: Span) -> Clock:
         ) from err
 
 
-def _seen(span: Span, series: FrameSeries, clock: Clock, where: str, fault: str) -> Span:
+def _seen(span: Span, series: FrameSeries, delay: float, where: str, fault: str) -> Span:
     """The part of the span in which a view has seen the stick, up to `LONGEST_GAP` at its ends."""
     good = ((series.flags & int(BAD_LINE)) == 0) & np.isfinite(series.lines.angle)
-    time = clock.to_robot(series.stamp[good])
+    time = series.stamp[good] - delay
     time = time[(time >= span.first) & (time <= span.last)]
     if len(time) == 0:
         raise RigError(

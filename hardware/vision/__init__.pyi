@@ -7,9 +7,9 @@ from .charuco import CalibrationError as CalibrationError
 from .charuco import CharucoBoard as CharucoBoard
 from .charuco import Intrinsics as Intrinsics
 from .charuco import calibrate_intrinsics as calibrate_intrinsics
-from .clock import Clock as Clock
-from .clock import ClockError as ClockError
-from .clock import fit_clock as fit_clock
+from .delay import Delay as Delay
+from .delay import DelayError as DelayError
+from .delay import fit_delay as fit_delay
 from .frame import Frame as Frame
 from .frame_measurement import Flag as Flag
 from .frame_measurement import FrameMeasurement as FrameMeasurement

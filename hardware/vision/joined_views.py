@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 
 from .camera_model import CameraModel
-from .clock import Clock
 from .inclination import inclination
 from .measurement_series import FrameSeries, interpolate_lines
 
@@ -26,10 +25,10 @@ class JoinedInclination(NamedTuple):
 
 
 class MeasuredView(NamedTuple):
-    """One camera's share: its measurements, clock and model."""
+    """One camera's share: its measurements, stamped on the robot's clock, delay [s] and model."""
 
     series: FrameSeries
-    clock: Clock
+    delay: float
     camera: CameraModel
 
 
@@ -44,7 +43,7 @@ def join(xz: MeasuredView, yz: MeasuredView, times: np.ndarray) -> JoinedInclina
         times: Wanted times of the robot's clock [s], shape (T,).
     """
     seen_xz, seen_yz = (
-        interpolate_lines(view.series, view.clock.to_camera(np.asarray(times))) for view in (xz, yz)
+        interpolate_lines(view.series, np.asarray(times) + view.delay) for view in (xz, yz)
     )
     joined = inclination(seen_xz.lines, seen_yz.lines, xz.camera, yz.camera)
     return JoinedInclination(joined.angle, joined.error, seen_xz.flags | seen_yz.flags)

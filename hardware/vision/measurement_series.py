@@ -16,7 +16,7 @@ class FrameSeries(NamedTuple):
     """Measurements of one view; all of shape (N,), one row a frame.
 
     Attributes:
-        stamp: When the camera gave it, on this computer's clock [s].
+        stamp: When the camera gave it [s].
         marker: Column and row of the marker [px], shape (N, 2), NaN where it is hidden.
         lines: The stick's line.
         flags: `Flag` as numbers.

@@ -10,6 +10,7 @@ RIG = bundled_rig()
 WAY = 2.0  # s, down into the cup, and out of it
 HOST = 5000.0  # host time of the robot's time 0
 DRIFT = -2e-5  # by which this computer's clock runs faster than the robot's
+READ_LATE = 0.001  # s, from a sample's time to when it is read
 DELAY = {"xz": 0.0323, "yz": 0.0571}  # s, from a picture's exposure to its stamp
 NOISE = np.radians(0.03)
 MARKER_NOISE = 0.05  # px
@@ -88,6 +89,6 @@ def samples_of(until, duration):
             "late": 1e-4 * (k % 5),
         }
         x, y, z = pivot(t, duration)
-        numbers |= {"x": x, "y": y, "z": z, "time": t, "host": host_time(t) + 0.001}
+        numbers |= {"x": x, "y": y, "z": z, "time": t, "host": host_time(t) + READ_LATE}
         rows.append(Sample(**numbers | {"index": k, "stirring": stirring, "runtime_state": 2}))
     return rows

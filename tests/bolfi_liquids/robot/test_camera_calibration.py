@@ -3,17 +3,21 @@
 import dataclasses
 import json
 import re
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from bolfi_liquids.hardware.recorder.views import camera_model
-from bolfi_liquids.hardware.rendering.boards import render_board, render_plumb_line
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.vision import CharucoBoard
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from bolfi_liquids.cli.app import app
+
+sys.path.append(str(Path(__file__).parents[2] / "hardware"))
+from rendered_boards import render_board, render_plumb_line  # noqa: E402
 
 cv2 = pytest.importorskip("cv2")
 

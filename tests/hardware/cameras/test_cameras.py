@@ -122,7 +122,7 @@ def test_a_webcam_delivers_frames_and_says_when_it_stops(video):
     first = camera.read()
     second = camera.read()
     assert first is not None and second is not None
-    assert (first.index, second.index) == (2, 5)  # a file's pictures are all there at once
+    assert (first.index, second.index) == (5, 11)  # a file's pictures are all there at once
     assert first.image.shape == (48, 64)
     assert first.stamp < second.stamp <= time.monotonic()
     with pytest.raises(CameraError, match=r"view\.avi.*no picture after frame 15"):
@@ -152,15 +152,31 @@ def test_a_webcam_that_is_not_there_is_named(tmp_path):
 
 
 class Capture:
-    """A driver that takes a picture each 20 ms, and keeps three that nobody has fetched."""
+    """A driver that takes a picture each 20 ms and keeps three; with three kept, it drops others.
+
+    A picture is its number: picture k is taken 20 k ms after the start. Only waiting for one, and a
+    tenth of a millisecond for each grab, moves the clock.
+    """
 
     def __init__(self):
-        self.start, self.fetched = time.monotonic(), 0
+        self.start = self.now = 100.0
+        self.taken = self.fetched = 0
+        self.kept = []
+
+    def monotonic(self):
+        return self.now
+
+    def take(self, until):
+        self.kept += [*range(self.taken + 1, until + 1)][: 3 - len(self.kept)]
+        self.taken = max(self.taken, until)
 
     def grab(self):
-        taken = int((time.monotonic() - self.start) / 0.02)
-        self.fetched = max(self.fetched + 1, taken - 2)
-        time.sleep(max(self.start + 0.02 * self.fetched - time.monotonic(), 0.0))
+        self.now += 1e-4
+        self.take(int((self.now - self.start) / 0.02))
+        if not self.kept:
+            self.take(self.taken + 1)
+            self.now = self.start + 0.02 * self.taken
+        self.fetched = self.kept.pop(0)
         return True
 
     def retrieve(self):
@@ -180,15 +196,15 @@ def test_a_picture_that_the_driver_has_kept_is_passed_over(monkeypatch):
     """Nobody knows since when it was waiting; each that is given has the time of its grab."""
     driver = Capture()
     monkeypatch.setattr(cv2, "VideoCapture", lambda _: driver)
+    monkeypatch.setattr("bolfi_liquids.hardware.cameras.webcam.time", driver)
     camera = Webcam(0, WebcamSettings(size=(64, 48)))
-    for pause in (0.0, 0.0, 0.11, 0.0, 0.5):
-        time.sleep(pause)
+    for pause in (0.0, 0.012, 0.11, 0.0, 0.025, 0.5):
+        driver.now += pause
         frame = camera.read()
         assert frame is not None
-        taken = driver.start + 0.02 * driver.fetched
         assert frame.image.mean() == driver.fetched % 256
-        assert 0.0 <= frame.stamp - taken < 0.015
-    assert frame.index > 5
+        assert frame.stamp == pytest.approx(driver.start + 0.02 * driver.fetched, abs=1e-3)
+    assert frame.index > 6
 
 
 class Asked:

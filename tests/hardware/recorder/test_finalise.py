@@ -20,17 +20,17 @@ from bolfi_liquids.hardware.recorder.directory import (
 from bolfi_liquids.hardware.recorder.events import RESERVE
 from bolfi_liquids.hardware.recorder.finalise import finalise, partial
 from bolfi_liquids.hardware.recorder.outcome import outcome
+from bolfi_liquids.hardware.recorder.raw import robot_time
 from bolfi_liquids.hardware.recorder.views import camera_model
 from bolfi_liquids.hardware.vision.frame_measurement import Flag
 from closed_form_session import (
     COMPLETED,
     DELAY,
-    DRIFT,
     MARKER_NOISE,
     NOISE,
+    READ_LATE,
     RIG,
     WAY,
-    host_time,
     inclination,
     pivot,
 )
@@ -71,11 +71,21 @@ def test_a_recording_is_what_the_closed_forms_say(session):
 def test_the_cameras_times_are_right_to_two_milliseconds(session):
     attrs = bl.open_recording(finalise(session())).attrs
     for view, delay in DELAY.items():
-        found = attrs[f"camera_{view}_clock_offset"]
-        middle = WAY + 6.0  # to which the offset belongs, about
-        assert abs(found - (middle - host_time(middle) - delay)) < 2e-3
-        assert abs(attrs[f"camera_{view}_clock_drift"] + DRIFT) < 1e-4
-        assert 0 < attrs[f"camera_{view}_clock_offset_error"] < 5e-4
+        # a sample is read a millisecond after its time
+        assert abs(attrs[f"camera_{view}_delay"] + READ_LATE - delay) < 2e-4
+        assert 0 < attrs[f"camera_{view}_delay_error"] < 5e-4
+
+
+@pytest.mark.parametrize("drift", [0.0, 1.5e-4, -1.5e-4])
+def test_samples_that_are_read_late_do_not_shift_the_clocks(drift):
+    rng = np.random.default_rng(0)
+    time = 700.0 + np.arange(0.0, 20.0, 0.008)
+    host = 5000.0 + (time - 700.0) * (1.0 + drift) + 0.004 * rng.random(len(time))
+    host[100:140] += 0.3
+    host[2000:2200] += np.linspace(0.1, 0.0, 200)
+    stamp = 5000.0 + np.array([0.0, 10.0, 20.0]) * (1.0 + drift)
+    found = robot_time(stamp, host, time) + 0.002  # samples are read so late in the mean
+    np.testing.assert_allclose(found, 700.0 + np.array([0.0, 10.0, 20.0]), atol=5e-4)
 
 
 def test_a_wrong_truth_would_be_seen(session):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.rendering import direction as down_direction
 from bolfi_liquids.hardware.vision import (
-    Clock,
     Flag,
     FrameMeasurement,
     MeasuredView,
@@ -170,24 +169,24 @@ def test_cameras_out_of_step_are_joined_at_times_of_the_robot():
     def truth(time):
         return np.radians(np.column_stack([10 * np.sin(7 * time), 8 * np.sin(9 * time + 1)]))
 
-    def view(name, clock, stamps, yaw_deg):
+    def view(name, delay, stamps, yaw_deg):
         camera = yawed(name, yaw_deg)
-        inclinations = truth(clock.to_robot(stamps))
+        inclinations = truth(stamps - delay)
         lines = lines_of(camera, inclinations, np.tile([0.01, 0.0, 0.235], (len(stamps), 1)))
         frames = [
             frame(k, t, lines.angle[k])._replace(offset=lines.offset[k])
             for k, t in enumerate(stamps)
         ]
-        return MeasuredView(as_series(frames), clock, camera)
+        return MeasuredView(as_series(frames), delay, camera)
 
     views = (
-        view("xz", Clock(500.0, 1e-5, 3.0), np.arange(90) / 30, 2.0),
-        view("yz", Clock(400.0, -2e-5, 100.0), 100.011 + np.arange(90) / 30, -1.0),
+        view("xz", 0.03, 500.03 + np.arange(90) / 30, 2.0),
+        view("yz", 0.08, 500.091 + np.arange(90) / 30, -1.0),
     )
     times = np.linspace(500.2, 502.8, 79)
     joined = join(*views, times)
     assert (joined.flags == 0).all()
     assert np.degrees(np.abs(joined.angle - truth(times)).max()) < 0.05
-    # taking both cameras' clocks for one is far worse
-    late = views[1]._replace(clock=Clock(400.05, -2e-5, 100.0))
+    # taking both cameras' delays for one is far worse
+    late = views[1]._replace(delay=0.03)
     assert np.degrees(np.abs(join(views[0], late, times).angle - truth(times)).max()) > 1.0
