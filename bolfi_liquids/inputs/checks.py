@@ -208,7 +208,7 @@ def _torn(recording: Recording, field: str) -> Measured:
     torn = np.any([torn_values(recording.values(name), JUMPS[name]) for name in JUMPS], axis=0)
     first = int(torn.argmax())
     return int(torn.sum()), (
-        f" of {len(torn)}, the first is sample {first} at {recording.time[first]:.10g} s"
+        f" of {len(torn)}, the first is sample {first} at {recording.time[first]:.13g} s"
     )
 
 
