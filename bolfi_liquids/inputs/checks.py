@@ -97,7 +97,7 @@ def check_values(recording: Recording) -> None:
         value = recording.attrs[name]
         size = value if isinstance(value, int | float) and not isinstance(value, bool) else np.nan
         if not 0.0 < size or not least <= size <= most:
-            given = f"{size:g} {unit}" if size == value else " ".join(repr(value).split())
+            given = " ".join(repr(value).split()) if np.isnan(size) else f"{size:g} {unit}"
             raise InputError(
                 f"{given:.80}, {_span(least, most)} {unit} allowed",
                 where=f"{recording.path}: attribute {name}",

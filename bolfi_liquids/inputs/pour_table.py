@@ -255,7 +255,7 @@ def _within(table: Table, name: str, least: float, most: float) -> NDArray[np.fl
         raise InputError(
             f"{table.column(name)[at]!r} is not between {least:g} and {most:g}",
             where=table.where(table.lines[at], name),
-            fix="correct or remove the line",
+            fix="correct or remove the line; what a scale shows below 0 is 0",
         )
     return values
 
