@@ -20,12 +20,12 @@ from .models import runtime
 from .pouring.choose import choose_pour, decided
 from .reporting.report import CHAPTERS, written
 from .reporting.warnings import Results
-from .run.compute import HERE, Compute
 from .run.run import RUN_TOML, Run
 
 if TYPE_CHECKING:
     from .calibration.result import Calibration
     from .criticism.result import Criticism
+    from .inference.simulations import Compute
     from .inputs.recording import Recording
     from .pouring.result import Pour
 
@@ -55,7 +55,7 @@ class Demo(NamedTuple):
 def run_demo(
     out: Path,
     *,
-    compute: Compute = HERE,
+    compute: "Compute | None" = None,
     fitted: "Callable[[Calibration], None]" = lambda _: None,
 ) -> Demo:
     """Calibrate on the bundled recording, find what is hidden in it, pour and write the report.
@@ -65,13 +65,16 @@ def run_demo(
 
     Args:
         out: The RUN directory.
-        compute: Where simulations run.
+        compute: Where simulations run; None is this process.
         fitted: Called with the calibration once there is one.
 
     Raises:
         InputError: `out` holds another run.
     """
+    from .inference.simulations import Compute
+
     out = given_path(out, Argument("out"))
+    compute = compute or Compute()
     data, ends = files("bolfi_liquids.data"), {"": time.perf_counter()}
     with (
         as_file(data / RECORDING) as recording,
@@ -79,7 +82,7 @@ def run_demo(
         as_file(data / CLEAN) as clean,
         ThreadPoolExecutor(1) as thread,
     ):
-        workers, quiet = compute.executor, compute._replace(progress=False)
+        workers = compute.executor
         where: dict[str, Any] = {"executor": workers, "timeout": compute.timeout}
 
         def beside(make: Callable[..., Any], *given: Any) -> Future[Any]:
@@ -99,7 +102,7 @@ def run_demo(
         fitted(calibration)
         # the fit is bad, and without criticism nobody should pour after it
         few = PourSettings(budget=POURS)
-        before = beside(decided, calibration, bundled_cups(), few, quiet)
+        before = beside(decided, calibration, bundled_cups(), few, compute)
         chapter = beside(CHAPTERS["calibration"], calibration)
         criticism = criticise(calibration, held_out=held_out, baseline=clean, **where)
         found = beside(CHAPTERS["criticism"], criticism)

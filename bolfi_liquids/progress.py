@@ -3,13 +3,8 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from numpy.typing import NDArray
-
 from .inference.progress import Advance as Advance
 from .inference.progress import progress_bar as progress_bar
-
-Simulate = Callable[[dict[str, NDArray], NDArray], NDArray]
-"""(theta, seeds) -> signals, one row for each seed."""
 
 
 def silent(steps: int) -> None:

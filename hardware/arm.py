@@ -1,11 +1,16 @@
 """What a robot must be able to do, by capability; each driver is a file of its own."""
 
 import math
-from typing import NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
+from .rig import Rig
+
 Six = tuple[float, float, float, float, float, float]
+Tool = Literal["stirring", "pouring"]
+WATCHDOG_PERIOD = 0.1  # s, after the last set-point, in which a controller stops its arm by itself
+LOOKAHEAD = 0.1  # s, by about which an arm lags its set-points
 
 
 class ArmState(NamedTuple):
@@ -118,6 +123,27 @@ class PathFollower(ArmReader, Protocol):
 
     def stop(self) -> None:
         """Bring the arm to rest and take no further command; returns at once."""
+        ...
+
+    def give_up(self) -> None:
+        """End the controller's program, on an arm at rest; waits for it, but not for ever."""
+        ...
+
+
+class Controller(Protocol):
+    """Opens its arm in the process that commands it, and can be sent there."""
+
+    @property
+    def address(self) -> str:
+        """By which a person knows it."""
+        ...
+
+    def reader(self, rig: Rig) -> ArmReader:
+        """The arm to look at, not connected yet."""
+        ...
+
+    def follower(self, rig: Rig, tool: Tool) -> PathFollower:
+        """The arm to command with a tool in its gripper, not connected yet."""
         ...
 
 

@@ -46,6 +46,11 @@ class Trouble(IntEnum):
     STOPPED = 4
     BAD_STAMPS = 5
 
+    @property
+    def kind(self) -> str:
+        """Of the event that tells of it."""
+        return self.name.lower()
+
 
 class Row(NamedTuple):
     """One participant's signs of life.

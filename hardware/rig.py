@@ -1,62 +1,31 @@
-"""rig.toml: the robot, the cameras and what stands in front of them, as a person writes it down."""
+"""rig.toml: the robot, the cameras and what stands in front of them, as a person writes it down.
+
+Each number has its ends here; what numbers must be true together is in `rig_checks`.
+"""
 
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import ValidationInfo, model_validator
+from pydantic import model_validator
 
-from .rig_limits import AxisLimits as AxisLimits
-from .rig_limits import Limits
 from .rig_numbers import (
     Acceleration,
     Angle,
     Balance,
+    Coordinate,
     Degrees,
     Length,
     Mass,
-    Number,
     Point,
     RigSection,
     Speed,
     Tcp,
     Turn,
-    contradiction,
-    is_recorded,
-    unless_recorded,
-    within,
+    Within,
 )
 
-CONTROLLER_RATE = {"cb3": 125.0, "e-series": 500.0}  # Hz; others are rounded by the controller
-MIN_STICK_DENSITY = 300.0  # [kg/m3]; balsa and cork are lighter, and swim
-MAX_STICK_DENSITY = 25_000.0  # [kg/m3]; no stick is denser
 MAX_CYCLES = 100  # stars in a recording
-MIN_LOOK = 0.05  # [m], from a camera to what it looks at
 MIN_CUP_RADIUS = 0.01  # [m]
-
-
-def checked_cycles(count: int) -> int:
-    """How often a pattern is stirred.
-
-    Raises:
-        ValueError: It is below 1 or above `MAX_CYCLES`.
-    """
-    if not 1 <= count <= MAX_CYCLES:
-        raise ValueError(f"{count} is not from 1 to {MAX_CYCLES}: so often a pattern is stirred")
-    return count
-
-
-def _device(number: int) -> int:
-    if number < 0:
-        raise ValueError(f"{number} is no number of a device; they count from 0")
-    return number
-
-
-def _odd(points: int) -> int:
-    if points % 2 == 0:
-        raise ValueError(f"{points} is even: all strokes would lie on one line; give an odd number")
-    return points
-
-
 View = Literal["xz", "yz"]
 
 
@@ -66,7 +35,7 @@ class Robot(RigSection, frozen=True):
     Attributes:
         driver: Which driver moves it.
         host: Address of its controller.
-        controller: Its generation; the emulator follows it.
+        controller: Its generation.
         rate: Of the motion loop [Hz].
         payload: Of gripper and stick [kg].
         payload_centre: In the flange's frame [m].
@@ -75,30 +44,22 @@ class Robot(RigSection, frozen=True):
         stirring_orientation: Rotation vector of the tool while it stirs, in the base frame [rad].
         pouring_orientation: The same before it pours, the source cup upright.
         start: Joint angles with the stick's pivot above the cup [rad]: which of the arm's
-            configurations works; with them `rig_geometry` checks where the cup stands.
+            configurations works; with them `rig_checks` tells where the cup stands.
     """
 
     driver: Literal["ur"] = "ur"
     host: str
     controller: Literal["cb3", "e-series"] = "cb3"
     rate: Annotated[
-        Number, within(50.0, 500.0, "Hz", "a slower loop jerks, and no controller is faster")
+        float, Within(50.0, 500.0, "Hz", "a slower loop jerks, and no controller is faster")
     ] = 125.0
-    payload: Annotated[Mass, within(0.1, 5.0, "kg", "so much weigh a gripper and what it holds")]
+    payload: Annotated[float, Within(0.1, 5.0, "kg", "so much weigh a gripper and what it holds")]
     payload_centre: Balance = (0.0, 0.0, 0.0)
     stirring_tcp: Tcp
     pouring_tcp: Tcp
     stirring_orientation: Turn
     pouring_orientation: Turn
     start: tuple[Angle, Angle, Angle, Angle, Angle, Angle]
-
-    @contradiction
-    def _divides_the_clock(self) -> None:
-        base = CONTROLLER_RATE[self.controller]
-        if base % self.rate:
-            raise ValueError(
-                f"rate {self.rate:g} Hz does not divide the controller's {base:g} Hz; use 125"
-            )
 
 
 class CupSettings(RigSection, frozen=True):
@@ -107,34 +68,19 @@ class CupSettings(RigSection, frozen=True):
     position: Point
     yaw_deg: Degrees = 0.0
     radius: Annotated[
-        Length, within(MIN_CUP_RADIUS, 0.2, "m", "a cup is as large as a hand can hold")
+        float, Within(MIN_CUP_RADIUS, 0.2, "m", "a cup is as large as a hand can hold")
     ]
-    height: Annotated[Length, within(0.01, 0.4, "m", "a cup is as high as a hand can hold")]
+    height: Annotated[float, Within(0.01, 0.4, "m", "a cup is as high as a hand can hold")]
     fill: Length
-
-    @contradiction
-    def _holds_its_fill(self) -> None:
-        if self.fill >= self.height:
-            raise ValueError(f"fill {self.fill} m is not below height {self.height} m")
 
 
 class StickSettings(RigSection, frozen=True):
     """The stick that hangs in the gripper; `colour` tells it from the background."""
 
-    radius: Annotated[Length, within(0.001, 0.03, "m", "a stick is no wire and no post")]
-    length: Annotated[Length, within(0.05, 0.6, "m", "a stick reaches into a cup")]
+    radius: Annotated[float, Within(0.001, 0.03, "m", "a stick is no wire and no post")]
+    length: Annotated[float, Within(0.05, 0.6, "m", "a stick reaches into a cup")]
     mass: Mass
     colour: Literal["dark", "bright"] = "dark"
-
-    @contradiction
-    def _weighs_as_a_stick(self) -> None:
-        if self.density > MAX_STICK_DENSITY:
-            raise ValueError(f"mass {self.mass:g} kg looks like grams; convert it to kg")
-        if self.density < MIN_STICK_DENSITY:
-            raise ValueError(
-                f"mass {self.mass:g} kg is a density of {self.density:.3g} kg/m3, which no stick "
-                f"has (at least {MIN_STICK_DENSITY:g}); weigh it in kg"
-            )
 
     @property
     def density(self) -> float:
@@ -145,7 +91,7 @@ class StickSettings(RigSection, frozen=True):
 class LiquidSettings(RigSection, frozen=True):
     """What is known of the liquid before it is stirred: its weighed density [kg/m3]."""
 
-    density: Annotated[Number, within(50.0, 20_000.0, "kg/m3", "no liquid is as light or as heavy")]
+    density: Annotated[float, Within(50.0, 20_000.0, "kg/m3", "no liquid is as light or as heavy")]
 
 
 class StirringSettings(RigSection, frozen=True):
@@ -164,11 +110,9 @@ class StirringSettings(RigSection, frozen=True):
     """
 
     pattern: Literal["star", "circle"] = "star"
-    points: Annotated[
-        int, within(5, 99, "vertices", "fewer make no star"), unless_recorded(_odd)
-    ] = 9
+    points: Annotated[int, Within(5, 99, "vertices", "fewer make no star")] = 9
     radius: Annotated[
-        Length, within(0.005, 0.15, "m", "a smaller star moves no liquid, a larger one fits no cup")
+        float, Within(0.005, 0.15, "m", "a smaller star moves no liquid, a larger one fits no cup")
     ] = 0.025
     speed: Speed = 0.1
     acceleration: Acceleration = 0.5
@@ -176,9 +120,9 @@ class StirringSettings(RigSection, frozen=True):
     clear_height: Length
     approach_speed: Speed = 0.05
     rest: Annotated[
-        Number, within(0.1, 60.0, "s", "the cameras' noise is learned from some pictures")
+        float, Within(0.1, 60.0, "s", "the cameras' noise is learned from some pictures")
     ] = 2.0
-    cycles: Annotated[int, unless_recorded(checked_cycles)] = 1
+    cycles: Annotated[int, Within(1, MAX_CYCLES, "times", "so often a pattern is stirred")] = 1
 
 
 class Camera(RigSection, frozen=True):
@@ -200,39 +144,28 @@ class Camera(RigSection, frozen=True):
     """
 
     view: View
-    source: Annotated[int, unless_recorded(_device)] | str = 0
-    width: Annotated[int, within(160, 4096, "px", "no webcam's picture is as wide")] = 640
-    height: Annotated[int, within(120, 4096, "px", "no webcam's picture is as high")] = 480
-    rate: Annotated[Number, within(5.0, 240.0, "Hz", "no webcam is as slow or as fast")] = 30.0
+    source: Annotated[int | str, Within(0, 9999, "", "devices are counted from 0")] = 0
+    width: Annotated[int, Within(160, 4096, "px", "no webcam's picture is as wide")] = 640
+    height: Annotated[int, Within(120, 4096, "px", "no webcam's picture is as high")] = 480
+    rate: Annotated[float, Within(5.0, 240.0, "Hz", "no webcam is as slow or as fast")] = 30.0
     position: Point
     target: Point
     roll_deg: Annotated[
-        Number, within(-45.0, 45.0, "deg", "a camera stands upright, or nearly so")
+        float, Within(-45.0, 45.0, "deg", "a camera stands upright, or nearly so")
     ] = 0.0
     intrinsics: str | None = None
-    focal_length: (
-        Annotated[Number, within(50.0, 20_000.0, "px", "no webcam sees as wide or as narrow")]
-        | None
-    ) = None
+    focal_length: Annotated[
+        float | None, Within(50.0, 20_000.0, "px", "no webcam sees as wide or as narrow")
+    ] = None
     marker: Point
     marker_radius: Annotated[
-        Length, within(0.001, 0.05, "m", "a disc on a gripper is seen, and fits on it")
+        float, Within(0.001, 0.05, "m", "a disc on a gripper is seen, and fits on it")
     ] = 0.006
 
     @property
     def is_device(self) -> bool:
         """Whether it is a camera, and not a file of pictures."""
         return isinstance(self.source, int) or self.source.startswith("/dev/")
-
-    @contradiction
-    def _knows_its_lens(self) -> None:
-        if self.intrinsics is None and self.focal_length is None:
-            raise ValueError("neither intrinsics nor focal_length is given")
-
-    @contradiction
-    def _looks_somewhere(self) -> None:
-        if np.linalg.norm(np.subtract(self.target, self.position)) < MIN_LOOK:
-            raise ValueError(f"position and target are less than {MIN_LOOK:g} m apart")
 
 
 class PouringSettings(RigSection, frozen=True):
@@ -248,9 +181,85 @@ class PouringSettings(RigSection, frozen=True):
     receiver: Point
     heading_deg: Degrees = 0.0
     approach_height: Annotated[
-        Length, within(0.02, 0.5, "m", "the source must come from above the receiver's rim")
+        float, Within(0.02, 0.5, "m", "the source must come from above the receiver's rim")
     ] = 0.1
     approach_speed: Speed = 0.05
+
+
+class AxisLimits(RigSection, frozen=True):
+    """A range for each axis [m], in the cup's frame."""
+
+    x: tuple[Coordinate, Coordinate]
+    y: tuple[Coordinate, Coordinate]
+    z: tuple[Coordinate, Coordinate]
+
+    @property
+    def low(self) -> np.ndarray:
+        """Lower corner, shape (3,)."""
+        return np.array([self.x[0], self.y[0], self.z[0]])
+
+    @property
+    def high(self) -> np.ndarray:
+        """Upper corner, shape (3,)."""
+        return np.array([self.x[1], self.y[1], self.z[1]])
+
+
+class Limits(RigSection, frozen=True):
+    """What a commanded motion and a running one must keep; a person may set them lower.
+
+    Attributes:
+        stirring: Where the pivot may go.
+        pouring: Where the source's lip may go.
+        speed: Of the tool's centre [m/s].
+        acceleration: Of it [m/s2].
+        tilt_rate_deg_s: Of the tool.
+        force: Change of the tool's force since rest [N].
+        tracking_error: Between where the tool is and where it was told to be [m].
+        latency: Between a command and its effect, which the box's margin allows for [s].
+        silence: For which the controller may say nothing new [s].
+        frame_age: Of a camera's latest picture [s].
+        overrun: By which a tick of the motion loop may be late [s].
+        reduced_mode: Whether the controller's reduced safety mode is good enough.
+    """
+
+    stirring: AxisLimits
+    pouring: AxisLimits
+    speed: Speed = 0.15
+    acceleration: Acceleration = 0.5
+    tilt_rate_deg_s: Annotated[
+        float, Within(5.0, 180.0, "deg/s", "no pour is slower, and no wrist faster")
+    ] = 180.0
+    force: Annotated[
+        float,
+        Within(
+            1.0,
+            50.0,
+            "N",
+            "the arm's own noise is as large as 1 N; a face bears 65 N (ISO/TS 15066), and an arm "
+            "pushes on while it stops",
+        ),
+    ] = 20.0
+    tracking_error: Annotated[
+        float,
+        Within(0.001, 0.02, "m", "the arm follows within a few mm, or something holds it"),
+    ] = 0.01
+    latency: Annotated[
+        float, Within(0.008, 0.5, "s", "no controller acts within less than its own period")
+    ] = 0.05
+    silence: Annotated[
+        float, Within(0.01, 0.05, "s", "a controller says something new every 8 ms")
+    ] = 0.05
+    frame_age: Annotated[
+        float,
+        Within(
+            0.004, 0.15, "s", "no camera is faster, and an arm must not go on unseen for longer"
+        ),
+    ] = 0.15
+    overrun: Annotated[
+        float,
+        Within(0.002, 0.05, "s", "no computer keeps time better than to a millisecond or two"),
+    ] = 0.05
+    reduced_mode: bool = False
 
 
 class Rig(RigSection, frozen=True):
@@ -266,120 +275,11 @@ class Rig(RigSection, frozen=True):
     pouring: PouringSettings
 
     @model_validator(mode="after")
-    def _fits_together(self, info: ValidationInfo) -> "Rig":
-        _check_views(self.cameras)
-        if not is_recorded(info):
-            _check_sources(self.cameras)
-            _check_frame_age(self)
-            _check_speeds(self)
-            _check_stick(self)
-            _check_heights(self)
-            check_receiver(self, MIN_CUP_RADIUS)
+    def _has_both_views(self) -> "Rig":
+        if (views := sorted(camera.view for camera in self.cameras)) != ["xz", "yz"]:
+            raise ValueError(f"cameras: one must see xz and one yz, got {' and '.join(views)}")
         return self
 
     def camera(self, view: View) -> Camera:
         """The camera of one view."""
         return next(camera for camera in self.cameras if camera.view == view)
-
-
-def check_receiver(rig: Rig, radius: float) -> None:
-    """Refuse a receiver that stands in the stirred cup.
-
-    Args:
-        rig: Says where both stand.
-        radius: Of the receiver [m], which is not the rig's but that of the cups that are poured
-            with.
-
-    Raises:
-        ValueError: They overlap.
-    """
-    apart = float(np.hypot(*np.subtract(rig.pouring.receiver[:2], rig.cup.position[:2])))
-    if apart <= rig.cup.radius + radius:
-        raise ValueError(
-            f"pouring.receiver is {apart:.3f} m from cup.position: it stands in the stirred cup "
-            f"(cup.radius = {rig.cup.radius} m, the receiver's is at least {radius:g} m)"
-        )
-
-
-def _check_views(cameras: tuple[Camera, Camera]) -> None:
-    views = sorted(camera.view for camera in cameras)
-    if views != ["xz", "yz"]:
-        raise ValueError(f"cameras: one must see xz and one yz, got {' and '.join(views)}")
-
-
-def _check_sources(cameras: tuple[Camera, Camera]) -> None:
-    first, second = (camera.source for camera in cameras)
-    if first == second and cameras[0].is_device:
-        raise ValueError(f"cameras: both have the source {first!r}; each needs its own")
-
-
-def _check_frame_age(rig: Rig) -> None:
-    slowest, limits = min(camera.rate for camera in rig.cameras), rig.limits
-    if limits.frame_age < 1.0 / slowest:
-        raise ValueError(
-            f"limits.frame_age {limits.frame_age} s is below the {1.0 / slowest:.3g} s from one "
-            "picture of a camera to the next"
-        )
-
-
-def _check_speeds(rig: Rig) -> None:
-    stirring, limits = rig.stirring, rig.limits
-    speeds = (
-        ("stirring.speed", stirring.speed),
-        ("stirring.approach_speed", stirring.approach_speed),
-        ("pouring.approach_speed", rig.pouring.approach_speed),
-    )
-    for name, speed in speeds:
-        if speed > limits.speed:
-            raise ValueError(f"{name} {speed} m/s is above limits.speed {limits.speed} m/s")
-    if stirring.acceleration > limits.acceleration:
-        raise ValueError(
-            f"stirring.acceleration {stirring.acceleration} m/s2 is above limits.acceleration "
-            f"{limits.acceleration} m/s2"
-        )
-
-
-def _check_stick(rig: Rig) -> None:
-    cup, stick, stirring = rig.cup, rig.stick, rig.stirring
-    tip = stirring.height - stick.length
-    if not 0.0 < tip < cup.fill:
-        raise ValueError(
-            f"stirring.height: the stick's tip is {tip:.3f} m above the floor, "
-            f"outside the liquid (cup.fill = {cup.fill} m)"
-        )
-    if stirring.radius + stick.radius >= cup.radius:
-        raise ValueError(
-            f"stirring.radius {stirring.radius} m brings the stick to the cup's wall "
-            f"(cup.radius = {cup.radius} m)"
-        )
-    if stick.mass >= rig.robot.payload:
-        raise ValueError(
-            f"stick.mass {stick.mass} kg is not below robot.payload {rig.robot.payload} kg, of "
-            "which the stick is a part"
-        )
-    wet = cup.fill - tip
-    lifted = rig.liquid.density * np.pi * stick.radius**2 * wet * (stick.length - wet / 2)
-    if lifted >= stick.mass * stick.length / 2:  # moments about the pivot
-        raise ValueError(
-            f"stick.mass {stick.mass} kg: the stick floats up in a liquid of "
-            f"{rig.liquid.density:g} kg/m3 (liquid.density); it must hang"
-        )
-
-
-def _check_heights(rig: Rig) -> None:
-    stick, stirring, box = rig.stick, rig.stirring, rig.limits.stirring
-    if box.z[0] <= stick.length:
-        raise ValueError(
-            f"limits.stirring.z {box.z[0]} m lets the stick's tip reach the "
-            f"cup's floor (stick.length = {stick.length} m)"
-        )
-    if stirring.clear_height - stick.length <= rig.cup.height:
-        raise ValueError(
-            f"stirring.clear_height {stirring.clear_height} m leaves the stick in the cup"
-        )
-    for name in ("height", "clear_height"):
-        height = getattr(stirring, name)
-        if not box.z[0] <= height <= box.z[1]:
-            raise ValueError(
-                f"stirring.{name} {height} m is outside of limits.stirring.z {list(box.z)} m"
-            )

@@ -1,14 +1,18 @@
 """Reading a rig.toml, and the one that comes with the package."""
 
 import tomllib
+from collections.abc import Iterator
+from difflib import get_close_matches
 from importlib.resources import as_file, files
 from pathlib import Path
+from typing import Any, get_args
 
 from pydantic import ValidationError
 
 from .errors import RigError
 from .rig import Rig
-from .rig_geometry import check_geometry
+from .rig_checks import contradictions
+from .rig_numbers import COMPARE, Fault, RigSection, beyond_their_ends
 
 BUNDLED = "rig.toml"
 
@@ -19,7 +23,7 @@ def open_rig(path: str | Path) -> Rig:
     Paths in it (`intrinsics`, `source`) count from the file's own directory.
 
     Raises:
-        RigError: The file is missing or cannot be used; the message names the field.
+        RigError: The file is missing or cannot be used; the message names the fields.
     """
     path = Path(path)
     try:
@@ -29,15 +33,11 @@ def open_rig(path: str | Path) -> Rig:
         raise RigError(what, where=str(path), fix="give the path of a rig.toml") from err
     except tomllib.TOMLDecodeError as err:
         raise RigError(f"not TOML: {err}", where=str(path), fix="correct that line") from err
-    try:
-        rig = Rig.model_validate(written)
-    except ValidationError as err:
-        raise _explained(err, str(path)) from err
-    return _beside(check_geometry(rig, str(path)), path.parent)
+    return _beside(_checked(written, str(path)), path.parent)
 
 
 def bundled_rig() -> Rig:
-    """The rig that comes with the package; its robot is the emulator."""
+    """The rig that comes with the package; no robot answers at its address."""
     with as_file(files(f"{__package__}.data") / BUNDLED) as path:
         return open_rig(path)
 
@@ -48,26 +48,58 @@ def checked_rig(rig: Rig, where: str = "rig") -> Rig:
     Raises:
         RigError: A number is not allowed, or they contradict each other.
     """
+    _checked(rig.model_dump(), where)
+    return rig
+
+
+def _checked(written: dict[str, Any], where: str) -> Rig:
+    """The rig of a file's content, all of whose fields are known, there, and as they should be."""
+    faults = list(_unknown(Rig, written))
     try:
-        Rig.model_validate(rig.model_dump())
+        rig = Rig.model_validate(written)
     except ValidationError as err:
-        raise _explained(err, where) from err
-    return check_geometry(rig, where)
+        raise _refusal([*faults, *_mistyped(err)], where) from err
+    if faults := faults or beyond_their_ends(rig):
+        raise _refusal(faults, where)
+    for fault in contradictions(rig):
+        raise _refusal([fault], where)
+    return rig
 
 
-def _explained(err: ValidationError, file: str) -> RigError:
-    found = err.errors(include_url=False, include_context=False)
-    # a mistyped name is also a missing one
-    first = next((one for one in found if one["type"] == "extra_forbidden"), found[0])
-    field = ".".join(map(str, first["loc"]))
-    message = first["msg"].removeprefix("Value error, ")
-    given = first["input"]
-    what = message if isinstance(given, dict) else f"{message}, got {given!r:.60}"
-    return RigError(
-        what,
-        where=f"{file}: {field}" if field else file,
-        fix="compare with the bundled rig.toml (SI units unless the name says otherwise)",
-    )
+def _refusal(faults: list[Fault], where: str) -> RigError:
+    """Of one fault, or of several that do not follow from each other."""
+    if len(faults) == 1:
+        field, what, fix = faults[0]
+        return RigError(what, where=f"{where}: {field}" if field else where, fix=fix)
+    told = ", ".join(f"{field}: {what}" for field, what, _ in faults)
+    return RigError(told, where=where, fix=COMPARE)
+
+
+def _mistyped(err: ValidationError) -> Iterator[Fault]:
+    """What is missing or of another type."""
+    for one in err.errors(include_url=False, include_context=False):
+        message, given = one["msg"].removeprefix("Value error, "), one["input"]
+        what = message if isinstance(given, dict) else f"{message}, got {given!r:.60}"
+        yield Fault(".".join(map(str, one["loc"])), what)
+
+
+def _unknown(kind: type[RigSection], written: Any, way: str = "") -> Iterator[Fault]:
+    """Fields that a section does not have, each with the likeliest that it has."""
+    for name, value in written.items() if isinstance(written, dict) else ():
+        if name in kind.model_fields:
+            yield from _unknown_within(kind.model_fields[name].annotation, value, f"{way}{name}")
+            continue
+        likely = get_close_matches(name, kind.model_fields, n=1)
+        hint = f"did you mean {likely[0]}?" if likely else f"known: {', '.join(kind.model_fields)}"
+        yield Fault(f"{way}{name}", f"no such field ({hint})")
+
+
+def _unknown_within(annotation: Any, written: Any, name: str) -> Iterator[Fault]:
+    if isinstance(annotation, type) and issubclass(annotation, RigSection):
+        yield from _unknown(annotation, written, f"{name}.")
+    elif isinstance(written, list | tuple):
+        for k, (part, kind) in enumerate(zip(written, get_args(annotation), strict=False)):
+            yield from _unknown_within(kind, part, f"{name}.{k}")
 
 
 def _beside(rig: Rig, directory: Path) -> Rig:

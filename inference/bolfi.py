@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import jax
@@ -29,7 +30,7 @@ from .notebook_display import as_html, as_text
 from .prior import Prior, check_support, checked_prior
 from .result import Fit
 from .sampling.confirmation import Before
-from .simulations.failures import Failure, incomparable, kind, unusable
+from .simulations.failures import Failure, FailureKind, unusable
 from .simulations.job import BATCH
 from .simulations.returned import told_signals
 from .sobol import sobol, start_size
@@ -142,7 +143,7 @@ class Bolfi:
     @property
     def errors(self) -> list[str]:
         """Why simulations failed, in the order told."""
-        return [str(error) for error in self._state.history.errors if error]
+        return [str(failure) for failure in self._state.history.why if failure is not None]
 
     @property
     def signal_shape(self) -> tuple[int, ...]:
@@ -247,7 +248,7 @@ class Bolfi:
         theta: Theta,
         signals: ArrayLike,
         seeds: ArrayLike | None = None,
-        errors: Sequence[str] | None = None,
+        errors: Sequence[str | Failure | None] | None = None,
     ) -> None:
         """Give the engine finished simulations: any number, any order, asked for or not.
 
@@ -261,7 +262,7 @@ class Bolfi:
                 a discrepancy or summary of the user's own compares them.
             seeds: Seeds of the runs [n], to be kept with the results. Of runs with equal theta,
                 seed and signal one is learned from.
-            errors: Why a run failed [n], to be kept for rows of NaN; "" elsewhere.
+            errors: Why a run failed [n], to be kept for rows of NaN; "" or None elsewhere.
 
         Raises:
             ValueError: shapes disagree, theta lies outside the prior's support, or the user's
@@ -277,8 +278,7 @@ class Bolfi:
         measured = _located(self._learner.measure(told_rows), rows, given_seeds)
         given_errors = told_errors(errors, np.isfinite(measured.discrepancy))
         self._check_compared(measured)
-        found = np.where(faults == "", np.array(measured.errors, str), faults)
-        why = np.where(found == "", given_errors, found)
+        known = [a or b or c for a, b, c in zip(faults, measured.errors, given_errors, strict=True)]
         kept, unlike = laid_out(told_rows, self.signal_shape)
         told = History(
             theta=natural,
@@ -288,7 +288,7 @@ class Bolfi:
             discrepancy=measured.discrepancy,
             seeds=given_seeds,
             rounds=np.full(len(natural), UNKNOWN),
-            errors=explain(told_rows, measured.discrepancy, why),
+            why=explain(told_rows, measured.discrepancy, known),
             unlike=unlike,
         )
         self._state = remember_told(self._state, told)
@@ -311,17 +311,17 @@ class Bolfi:
         if self.succeeded or np.isfinite(measured.discrepancy).any():
             return
         failed = [
-            error
-            for error in (*self.errors, *measured.errors)
-            if error and kind(error) is Failure.INCOMPARABLE
+            failure
+            for failure in (*self._state.history.why, *measured.errors)
+            if failure is not None and failure.kind is FailureKind.INCOMPARABLE
         ]
         if len(failed) >= BATCH:
-            raise ValueError(failed[-1].removeprefix(incomparable("")))
+            raise ValueError(failed[-1].text)
 
     def _signals(
         self, n: int, signals: ArrayLike
-    ) -> tuple[Sequence[np.ndarray | None], np.ndarray]:
-        """The n signals told, None where something else was, and what that was, str [n]."""
+    ) -> tuple[Sequence[np.ndarray | None], list[Failure | None]]:
+        """The n signals told, None where something else was, and what that was."""
         shape = self.expected_shape
         try:
             rows, faults = told_signals(signals, n, shape)
@@ -335,8 +335,9 @@ class Bolfi:
                 f"signals must have shape {due}, one row per theta, got {error.shape}"
             ) from error
         due = "an array of numbers" if shape is None else shape
-        told = [fault and unusable(f"{fault} was told, {due} is due") for fault in faults]
-        return rows, np.array(told, str)
+        return rows, [
+            unusable(f"{fault} was told, {due} is due") if fault else None for fault in faults
+        ]
 
     def fit(
         self,
@@ -388,11 +389,14 @@ class Bolfi:
 
 
 def _located(measured: Measured, theta: Mapping[str, np.ndarray], seeds: np.ndarray) -> Measured:
-    """The same, each error naming its run: theta (name -> [n]) and seeds [n]."""
+    """The same, each failure naming its run: theta (name -> [n]) and seeds [n]."""
 
     def run(i: int) -> str:
         point = {name: float(column[i]) for name, column in theta.items()}
         return f"{point}" if seeds[i] == UNKNOWN else f"{point}, seed {seeds[i]}"
 
-    errors = [error and f"{error} of {run(i)}" for i, error in enumerate(measured.errors)]
+    errors = [
+        error and replace(error, text=f"{error.text} of {run(i)}")
+        for i, error in enumerate(measured.errors)
+    ]
     return measured._replace(errors=errors)

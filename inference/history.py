@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .simulations.failures import count, not_finite
+from .simulations.failures import Failure, FailureKind, count, not_finite
 from .simulations.returned import commonest
 
 UNKNOWN = -1  # seed or round of a simulation made elsewhere
@@ -22,7 +22,7 @@ class History(NamedTuple):
     discrepancy: np.ndarray  # [n], NaN where failed
     seeds: np.ndarray  # int64 [n]
     rounds: np.ndarray  # int64 [n]
-    errors: np.ndarray  # str [n], why a run failed; "" where it succeeded
+    why: np.ndarray  # object [n], the Failure of a run; None where it succeeded
     unlike: Mapping[int, np.ndarray]  # row -> its signal, if that has another shape
 
     def signal(self, row: int) -> np.ndarray:
@@ -56,9 +56,14 @@ class History(NamedTuple):
         return self.theta[row].tobytes(), int(self.seeds[row])
 
     @property
+    def errors(self) -> np.ndarray:
+        """Why a run failed, in words, str [n]; "" where it succeeded."""
+        return np.array(["" if one is None else str(one) for one in self.why], str)
+
+    @property
     def failures(self) -> dict[str, int]:
         """Failed runs by kind: "raised", "not finite", "timeout", "unusable", "incomparable"."""
-        return count(self.errors)
+        return count(self.why)
 
 
 class State(NamedTuple):
@@ -81,7 +86,7 @@ def init(dimension: int, signal_shape: tuple[int, ...], features: int) -> State:
         discrepancy=np.zeros(0),
         seeds=none,
         rounds=none,
-        errors=np.zeros(0, str),
+        why=np.zeros(0, object),
         unlike={},
     )
     return State(history, rows, none, designed=0, asked=0, rounds=0)
@@ -156,12 +161,18 @@ def laid_out(
 
 
 def explain(
-    signals: Sequence[np.ndarray | None], discrepancy: np.ndarray, errors: np.ndarray
+    signals: Sequence[np.ndarray | None],
+    discrepancy: np.ndarray,
+    known: Sequence[Failure | None],
 ) -> np.ndarray:
-    """Why each run failed, str [n]: `errors` [n] where it says so, else what is not finite."""
-    finite = np.array([one is not None and bool(np.isfinite(one).all()) for one in signals], bool)
-    found = np.where(finite, not_finite("the discrepancy"), not_finite("the signal"))
-    return np.where(np.isfinite(discrepancy), "", np.where(errors == "", found, errors))
+    """The Failure of each run, object [n]: what is known [n], else what is not finite; None where
+    the discrepancy is finite."""
+    why = np.full(len(signals), None)
+    for i in np.flatnonzero(~np.isfinite(discrepancy)).tolist():
+        signal = signals[i]
+        finite = signal is not None and bool(np.isfinite(signal).all())
+        why[i] = known[i] or not_finite("the discrepancy" if finite else "the signal")
+    return why
 
 
 def told_seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:
@@ -190,25 +201,35 @@ def told_seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:
     return np.ma.getdata(array).astype(np.int64)
 
 
-def told_errors(errors: Sequence[str] | None, succeeded: np.ndarray) -> np.ndarray:
-    """The errors of n runs that a user tells, str [n]; "" for each if none are told.
+def told_errors(
+    errors: Sequence[str | Failure | None] | None, succeeded: np.ndarray
+) -> list[Failure | None]:
+    """The failures of n runs that a user tells.
 
     Args:
-        errors: As told.
+        errors: As told; a text counts as what was raised, "" and None are no failure.
         succeeded: Whether each run left a signal that can be learned from, bool [n].
 
     Raises:
         ValueError: not n texts, or one for a run that succeeded.
     """
     n = len(succeeded)
-    array = np.full(n, "") if errors is None else np.asarray(errors, str)
-    if array.shape != (n,):
+    given = np.full(n, None) if errors is None else np.asarray(errors, object)
+    if given.shape != (n,):
         raise ValueError(
-            f"errors must have shape ({n},), one per theta, got {array.shape}: {errors!r:.100}"
+            f"errors must have shape ({n},), one per theta, got {given.shape}: {errors!r:.100}"
         )
-    for run in np.flatnonzero((array != "") & succeeded):
-        raise ValueError(
-            f"errors[{run}] is {str(array[run])!r:.100}, but the signal of that run is finite: "
-            'tell NaN in its place if the run failed, or the error ""'
-        )
-    return array
+    told = [_failure(one) for one in given]
+    for run in np.flatnonzero(succeeded):
+        if told[run] is not None:
+            raise ValueError(
+                f"errors[{run}] is {str(told[run])!r:.100}, but the signal of that run is finite: "
+                'tell NaN in its place if the run failed, or the error ""'
+            )
+    return told
+
+
+def _failure(told: object) -> Failure | None:
+    if told is None or isinstance(told, Failure):
+        return told
+    return Failure(FailureKind.RAISED, str(told)) if str(told) else None

@@ -15,7 +15,6 @@ from .arguments import (
     check_function,
     check_progress,
     check_text,
-    check_timeout,
     checked_array,
     checked_integer,
     checked_number,
@@ -25,8 +24,9 @@ from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
 from .prior import Prior
 from .progress import progress_bar
 from .result import MUCH_DOUBT, Fit
-from .simulations.bank import Simulation, SimulationBank, check_bank
-from .simulations.executors import Workers, check_executor, open_executor
+from .simulations.bank import Simulation, SimulationBank
+from .simulations.compute import open_compute
+from .simulations.executors import Workers
 from .simulations.job import (
     BATCH,
     Job,
@@ -36,7 +36,7 @@ from .simulations.job import (
     of_one_shape,
     simulation_seed,
 )
-from .simulations.runner import Keep, Runner
+from .simulations.runner import Runner
 from .sobol import start_size
 from .surrogates.base import Acquisition
 from .surrogates.families import Family
@@ -147,13 +147,10 @@ def fit(  # noqa: PLR0913  the one call that most users make
     budget = checked_integer("budget", budget, least, MOST_SIMULATIONS)
     confirm = checked_integer("confirm", confirm, 0, MOST_SIMULATIONS)
     confirm = 0 if simulate is None else confirm
-    check_timeout(timeout)
     check_progress(progress)
     check_text("identity", identity)
     for name, flag in {"vectorised": vectorised, "in_rounds": in_rounds, "warn": warn}.items():
         check_flag(name, flag)
-    check_bank(bank)
-    check_executor(executor)
     if budget or simulate is not None:
         check_function("simulate", simulate)
     told = _length(earlier)
@@ -181,13 +178,10 @@ def fit(  # noqa: PLR0913  the one call that most users make
             "raise budget or lower initial"
         )
     with ExitStack() as stack:
-        if not isinstance(bank, SimulationBank):
-            bank = stack.enter_context(SimulationBank(bank))
+        compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         advance = stack.enter_context(progress_bar("simulations", budget + confirm, shown=progress))
-        workers = stack.enter_context(open_executor(executor))
         simulator: Any = simulate if vectorised else OneByOne(cast(SingleSimulator, simulate))
-        keep = Keep(bank, identity, batch, workers, timeout)
-        runner = stack.enter_context(Runner(simulator, keep))
+        runner = stack.enter_context(Runner(simulator, compute, identity))
         schedule = _in_rounds if in_rounds else _in_flight
         finished = schedule(engine, runner, budget, batch)
         seconds = 0.0
@@ -198,8 +192,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
             raise RuntimeError(
                 f"{engine.succeeded} of {engine.told} simulations succeeded, copies counted once; "
                 f"{MIN_LEARN} are needed; the last error: {(engine.errors or ['none'])[-1]}. "
-                f"{bank.where}; mend the cause, or raise budget, and repeat the call to go on "
-                "from there"
+                f"{runner.bank.where}; mend the cause, or raise budget, and repeat the call to go "
+                "on from there"
             )
         made = engine.fit({"simulator": seconds}, warn=False)
         if not budget and made.unreached:  # a table of losses, rather than of outputs

@@ -157,26 +157,19 @@ def watched_landings(batch: PourBatch, watch: Watch | None = None) -> Landings:
     return Landings(position, np.array([flights.retained for flights in found]))
 
 
-def draining(
-    liquid: Liquid,
-    angular_velocity: ArrayLike,
-    cups: Cups,
-    seeds: ArrayLike,
-    held: ArrayLike,
-    effects: Mapping[str, ArrayLike] | None = None,
-) -> np.ndarray:
+def draining(batch: PourBatch, held: ArrayLike) -> np.ndarray:
     """Share that is left in the source and at its lip when it has been held for some time.
 
     Args:
-        liquid, angular_velocity, cups, seeds, effects: Of `landings`.
-        held: Times since the source has come to its final angle [s], up to the hold of `cups`,
+        batch: The pours.
+        held: Times since the source has come to its final angle [s], up to the hold of its cups,
             shape [T].
 
     Returns:
         Shape [B, T]; NaN of a pour that went wrong.
     """
-    found = _flights(PourBatch(liquid, angular_velocity, cups, seeds, effects=effects))
-    turned = cups.pour.final_angle / _checked_rate(angular_velocity, len(found))
+    found = _flights(batch)
+    turned = batch.cups.pour.final_angle / _checked_rate(batch.angular_velocity, len(found))
     return np.stack(
         [flights.left(at + np.asarray(held)) for flights, at in zip(found, turned, strict=True)]
     )

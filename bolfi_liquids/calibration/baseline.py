@@ -1,7 +1,7 @@
 """Clean recordings: the residual that the simulator leaves on them counts as usual."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from ..errors import Argument, InputError
 from ..inputs.recording import Recording
+from ..simulators import StirSimulator, stir_simulator
 from .noise import sensor_noise
-from .stir_simulator import Stirring, stirring_of
 from .stirs import camera_noise, frame_interval, same_experiment, same_rate, stir_experiment
 
 if TYPE_CHECKING:
     from ..inference import Prior
-    from ..inference.criticism import Extension, Keeping, UsualResidual
+    from ..inference.criticism import Extension, Report, UsualResidual
+    from ..inference.simulations import Compute
 
 STARTING_RUNS = 4  # of each clean recording, all over the prior; as many follow near the best
 CLEAN_RUNS = 2 * STARTING_RUNS
@@ -50,10 +51,18 @@ def clean_residuals(
     particles: int,
     prior: "Prior",
     extensions: "dict[str, Extension]",
-    *,
-    keeping: "Keeping",
+    compute: "Compute",
+    report: "Report",
 ) -> list[Clean]:
     """Calibrate the simulator on each of them in turn.
+
+    Args:
+        recordings: Clean ones.
+        particles: Number of particles of the simulated liquid; 0: cells follow the stick.
+        prior: Of the liquid's parameters.
+        extensions: The effects that may act.
+        compute: Where simulations are made and kept.
+        report: Called with the phase and the number of simulations finished in it.
 
     Raises:
         RuntimeError: Every simulation of one of them failed.
@@ -63,21 +72,22 @@ def clean_residuals(
     def learn(recording: Recording) -> Clean:
         name, made = recording.path.name, []
 
-        def report(phase: str, finished: int) -> None:
+        def counted(_: str, finished: int) -> None:
             made.append(finished)
-            keeping.report(f"baseline {name}", finished)
+            report(f"baseline {name}", finished)
 
         cameras = camera_noise([recording])
-        experiment = stir_experiment(stirring_of([recording], particles), cameras, None, name)
+        experiment = stir_experiment(stir_simulator([recording], particles), cameras, None, name)
         # with one seed for all, no criticism in this run simulates what another did
-        own = replace(keeping, seed=0, report=report)
-        left = own_residual(experiment, prior, extensions, own, STARTING_RUNS)
+        left = own_residual(
+            experiment, prior, extensions, compute, report=counted, start=STARTING_RUNS
+        )
         return Clean(recording, left.residual, left.best.get("viscosity"), sum(made))
 
     return [learn(recording) for recording in recordings]
 
 
-def check_rig(stirring: Stirring, recording: Recording, where: str) -> None:
+def check_rig(stirring: StirSimulator, recording: Recording, where: str) -> None:
     """Raise `InputError` unless a recording has the sizes of the run's rig."""
     for name in RIG_SIZES:
         there, here = recording.number(name), stirring.recordings[0].number(name)
@@ -89,7 +99,7 @@ def check_rig(stirring: Stirring, recording: Recording, where: str) -> None:
             )
 
 
-def check_baseline(stirring: Stirring, baseline: Sequence[Recording]) -> None:
+def check_baseline(stirring: StirSimulator, baseline: Sequence[Recording]) -> None:
     """Raise `InputError` unless clean recordings are of the run's rig and frame rate."""
     first = stirring.recordings[0]
     for recording in baseline:
@@ -104,7 +114,7 @@ def check_baseline(stirring: Stirring, baseline: Sequence[Recording]) -> None:
 
 
 def usual_for(
-    stirring: Stirring, clean: Sequence[Clean], viscosity: float | None
+    stirring: StirSimulator, clean: Sequence[Clean], viscosity: float | None
 ) -> "UsualResidual | None":
     """What is usual for an experiment on a liquid [Pa s]; None where nothing is known to be.
 
@@ -117,7 +127,7 @@ def usual_for(
 
 
 def usual_elsewhere(
-    stirring: Stirring, clean: Sequence[Clean], viscosity: float | None
+    stirring: StirSimulator, clean: Sequence[Clean], viscosity: float | None
 ) -> "UsualResidual | None":
     """What is usual on paths of which there is no clean recording; None if there is none at all."""
     return _usual(clean, [False] * len(clean), viscosity, stirring.least_viscosity)

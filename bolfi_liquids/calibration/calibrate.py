@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import mkdtemp
@@ -19,26 +19,28 @@ from ..inputs.recording import Recording, recording_warnings
 from ..inputs.settings import (
     CalibrationSettings,
     CriticismSettings,
+    Sampler,
+    Surrogate,
 )
 from ..inputs.start import check_start
 from ..progress import Advance, after_first, progress_bar
-from ..run.compute import Compute, open_compute
+from ..run.compute import open_compute
 from ..run.given_pours import keep_pours
 from ..run.provenance import versions
 from ..run.recordings import check_names, keep_recordings
 from ..run.run import RUN_TOML, Run
 from ..run.simulations import warn_of_failures
+from ..simulators import StirSimulator, stir_simulator
 from .baseline import CLEAN_RUNS, Clean, check_baseline, clean_residuals
 from .engine_fit import confirmed, fit_recordings
 from .model_error import model_error, noise_beside
 from .result import Calibration
-from .stir_simulator import Stirring, stirring_of
 from .stirs import camera_noise, effects_of
 from .summary import CalibrationSummary
 
 if TYPE_CHECKING:
-    from ..inference import Prior, SimulationBank
-    from ..inference.simulations import Workers
+    from ..inference import Prior
+    from ..inference.simulations import Compute, Workers
     from ..models import Cups
 
 logger = logging.getLogger(__name__)
@@ -54,10 +56,10 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     cups: "Cups | str | Path | None" = None,
     budget: int = 20,
     seed: int = 0,
-    surrogate: str = "signal",
+    surrogate: Surrogate = "signal",
     batch: int = 4,
     particles: int = 0,
-    sampler: str = "nuts",
+    sampler: Sampler = "nuts",
     chains: int = 4,
     draws: int = 1000,
     resume: bool = False,
@@ -120,17 +122,17 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     table, made_with = table_and_cups(pours, cups)
     if prior is not None:
         check_prior(prior)
-    stirring = stirring_of(opened, settings.particles)
+    stirring = stir_simulator(opened, settings.particles)
     check_names(stirring.recordings)
     clean = _open_clean(baseline, stirring, surrogate)
     path = (
         Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
     )
     prior = _usual_prior(path, resume) if prior is None else prior
-    record = run_record(settings, prior, stirring, clean, timeout)
+    inputs = CalibrationInputs(settings, prior, stirring, clean)
     with (
-        open_compute(executor, timeout, progress=progress) as compute,
-        Run.begun(path, record, resume=resume, growing="settings.budget") as run,
+        open_compute(executor, timeout) as compute,
+        Run.begun(path, inputs.record(timeout), resume=resume, growing="settings.budget") as run,
     ):
         keep_recordings(path, stirring.recordings)
         if table is not None:
@@ -139,54 +141,60 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         for notice in [*recording_warnings(opened), *frame_warnings(opened)]:
             logger.warning(notice)
         if run.result("calibrate") is None:
-            _calibrate(run, stirring, clean, prior, settings, compute)
+            _calibrate(run, inputs, compute, progress)
         return Calibration.of(run)
 
 
-def run_record(
-    settings: CalibrationSettings,
-    prior: "Prior",
-    stirring: Stirring,
-    clean: Sequence[Recording] = (),
-    timeout: float | None = None,
-) -> dict[str, Any]:
-    """Content of run.toml: settings, inputs, versions; see `run.run.MUST_AGREE`."""
-    from ..inference.engine_version import ENGINE_VERSION
+@dataclass(frozen=True, eq=False)
+class CalibrationInputs:
+    """What decides a calibration.
 
-    return {
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "settings": asdict(settings) | {"prior": describe_prior(prior)},
-        "engine": {"version": ENGINE_VERSION},
-        "simulator": stirring.settings,
-        "inputs": {
-            "sha256": [recording.hash for recording in stirring.recordings],
-            **({"baseline": [recording.hash for recording in clean]} if clean else {}),
-        },
-        "files": {"recordings": [recording.path.name for recording in stirring.recordings]},
-        "versions": versions(),
-        # runs may go on with another limit, but it decides which simulations were given up
-        **({} if timeout is None else {"timeouts": [float(timeout)]}),
-    }
+    Attributes:
+        settings: The numbers and words.
+        prior: Of the liquid's parameters.
+        stirring: The simulator, with the recordings of one liquid.
+        clean: Clean recordings, of which the simulator's error is learned.
+    """
+
+    settings: CalibrationSettings
+    prior: "Prior"
+    stirring: StirSimulator
+    clean: tuple[Recording, ...] = ()
+
+    def record(self, timeout: float | None = None) -> dict[str, Any]:
+        """Content of run.toml: settings, inputs, versions; see `run.run.MUST_AGREE`."""
+        from ..inference.engine_version import ENGINE_VERSION
+
+        recordings, clean = self.stirring.recordings, self.clean
+        return {
+            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "settings": asdict(self.settings) | {"prior": describe_prior(self.prior)},
+            "engine": {"version": ENGINE_VERSION},
+            "simulator": self.stirring.settings,
+            "inputs": {
+                "sha256": [recording.hash for recording in recordings],
+                **({"baseline": [recording.hash for recording in clean]} if clean else {}),
+            },
+            "files": {"recordings": [recording.path.name for recording in recordings]},
+            "versions": versions(),
+            # runs may go on with another limit, but it decides which simulations were given up
+            **({} if timeout is None else {"timeouts": [float(timeout)]}),
+        }
 
 
-def _calibrate(
-    run: Run,
-    stirring: Stirring,
-    baseline: tuple[Recording, ...],
-    prior: "Prior",
-    settings: CalibrationSettings,
-    compute: Compute,
-) -> None:
+def _calibrate(run: Run, inputs: CalibrationInputs, compute: "Compute", progress: bool) -> None:
     """Search, confirm, judge, and keep the result in the run."""
     from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES, check_of
     from .posterior_file import results_tree
 
-    needed = settings.budget + CLEAN_RUNS * len(baseline) + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
+    settings, stirring = inputs.settings, inputs.stirring
+    judging = PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
+    needed = settings.budget + CLEAN_RUNS * len(inputs.clean) + judging
     with run.bank() as bank, ExitStack() as stack:
         kept = min(len(bank), needed)
-        bar = progress_bar("simulating stirs", needed, shown=compute.progress, done=kept)
+        bar = progress_bar("simulating stirs", needed, shown=progress, done=kept)
         advance = after_first(kept, stack.enter_context(bar))
-        keep = compute.keep(bank, stirring.identity, settings.batch)
+        compute = replace(compute, batch=settings.batch, bank=bank)
         # the paper's surrogate has no noise to which an error adds
         allows = settings.surrogate == "signal"
         # beside the largest error the search does not settle on one liquid too early
@@ -194,8 +202,8 @@ def _calibrate(
         fit = fit_recordings(
             stirring,
             stirring.observed,
-            prior,
-            keep,
+            inputs.prior,
+            compute,
             settings,
             confirm=0,
             warn=False,
@@ -204,42 +212,31 @@ def _calibrate(
         )
         error = None
         if allows:
-            clean = _clean_residuals(baseline, prior, settings, bank, compute, advance)
+            clean = _clean_residuals(inputs, compute, advance)
             error = model_error(stirring, fit.best["viscosity"], clean)
-        fit = confirmed(fit, error, stirring, keep, settings, advance)
-        warn_of_failures(fit.history.errors.tolist(), compute.timeout)
+        fit = confirmed(fit, error, stirring, compute, settings, advance)
+        warn_of_failures(fit.history.why.tolist(), compute.timeout)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )
-        check = check_of(fit, stirring, settings.seed, keep, advance=advance)
+        check = check_of(fit, stirring, settings.seed, compute, advance=advance)
     tree = results_tree(sampled, fit, stirring, check)
     summary = CalibrationSummary.from_fit(tree, fit, stirring, check, error, settings.budget)
     run.keep("calibrate", tree, run.made_from, summary.to_json())
 
 
 def _clean_residuals(
-    baseline: tuple[Recording, ...],
-    prior: "Prior",
-    settings: CalibrationSettings,
-    bank: "SimulationBank",
-    compute: Compute,
-    advance: Advance,
+    inputs: CalibrationInputs, compute: "Compute", advance: Advance
 ) -> list[Clean]:
     """What the simulator leaves of clean recordings; criticise finds the same simulations."""
-    from ..inference.criticism import Keeping
-
-    def report(_: str, finished: int) -> None:
-        advance(finished)
-
-    keeping = Keeping(
-        bank,
-        CriticismSettings.batch,
-        report=report,
-        executor=compute.executor,
-        timeout=compute.timeout,
+    return clean_residuals(
+        inputs.clean,
+        inputs.settings.particles,
+        inputs.prior,
+        effects_of("stir"),
+        compute=replace(compute, batch=CriticismSettings.batch),
+        report=lambda _, finished: advance(finished),
     )
-    effects = effects_of("stir")
-    return clean_residuals(baseline, settings.particles, prior, effects, keeping=keeping)
 
 
 def _usual_prior(path: Path, resume: bool) -> "Prior":
@@ -250,7 +247,7 @@ def _usual_prior(path: Path, resume: bool) -> "Prior":
 
 
 def _open_clean(
-    baseline: Source | Sequence[Source], stirring: Stirring, surrogate: str
+    baseline: Source | Sequence[Source], stirring: StirSimulator, surrogate: str
 ) -> tuple[Recording, ...]:
     """Clean recordings beside which a run's can be calibrated.
 

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inference.simulations import Keep
+from ..inference.simulations import Compute
 from ..progress import Advance, silent
 from ..run.simulations import simulate_kept
 from ..seeds import Phase, simulation_seeds
-from .stir_simulator import Stirring
+from ..simulators import StirSimulator
 
 if TYPE_CHECKING:
     from ..inference.result import Closest, Fit
@@ -32,7 +32,7 @@ class PosteriorCheck(NamedTuple):
 
 
 def check_of(
-    fit: "Fit", stirring: Stirring, seed: int, keep: Keep, *, advance: Advance = silent
+    fit: "Fit", stirring: StirSimulator, seed: int, compute: Compute, *, advance: Advance = silent
 ) -> PosteriorCheck:
     """Collect the runs at draws of a posterior, and simulate theta*.
 
@@ -40,7 +40,7 @@ def check_of(
         fit: Of the engine, with runs that confirm it or not.
         stirring: The simulator, and what was recorded.
         seed: Of the run.
-        keep: Where simulations are made and kept.
+        compute: Where simulations are made and kept.
         advance: Called with 1 for each simulation.
 
     Raises:
@@ -55,7 +55,7 @@ def check_of(
         )
     at_best = {name: np.full(THETA_STAR_REPLICATES, value) for name, value in fit.best.items()}
     seeds = simulation_seeds(seed, Phase.REPLICATES, THETA_STAR_REPLICATES)
-    replicates = simulate_kept(stirring.simulate, at_best, seeds, keep, advance=advance)
+    replicates = simulate_kept(stirring, at_best, seeds, compute, advance=advance)
     return PosteriorCheck(
         _closest(stirring, fit, good),
         fit.history.signals[good],
@@ -64,7 +64,7 @@ def check_of(
     )
 
 
-def _closest(stirring: Stirring, fit: "Fit", runs: NDArray[np.int64]) -> "Closest":
+def _closest(stirring: StirSimulator, fit: "Fit", runs: NDArray[np.int64]) -> "Closest":
     """The one of these runs that comes nearest to what was recorded."""
     from ..inference.result import Closest
 

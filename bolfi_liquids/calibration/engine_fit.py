@@ -8,20 +8,20 @@ from numpy.typing import NDArray
 
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
 from ..progress import Advance
+from ..simulators import StirSimulator
 from .check import PREDICTIVE_DRAWS
 from .model_error import ModelError, noise_beside
-from .stir_simulator import Stirring
 
 if TYPE_CHECKING:
     from ..inference import Fit, Prior
-    from ..inference.simulations import Keep
+    from ..inference.simulations import Compute
 
 
 def fit_recordings(
-    stirring: Stirring,
+    stirring: StirSimulator,
     observed: NDArray,
     prior: "Prior",
-    keep: "Keep",
+    compute: "Compute",
     settings: CalibrationSettings,
     **more: Any,
 ) -> "Fit":
@@ -31,7 +31,7 @@ def fit_recordings(
         stirring: The simulator, and how two signals are compared.
         observed: Inclinations (T, 2) [rad], NaN where missing.
         prior: Prior of the parameters.
-        keep: Where simulations are made and kept.
+        compute: Where simulations are made and kept.
         settings: Budget, surrogate and seed.
         more: Other arguments of `inference.fit`, and `budget` in place of the settings'; without
             `progress` no bar is shown.
@@ -47,17 +47,17 @@ def fit_recordings(
         observed,
         batch=settings.batch,
         seed=settings.seed,
-        executor=keep.executor,
+        executor=compute.executor,
         in_rounds=True,
-        bank=keep.bank,
-        identity=keep.identity,
-        timeout=keep.timeout,
+        bank=":memory:" if compute.bank is None else compute.bank,
+        identity=stirring.identity,
+        timeout=compute.timeout,
         **{"budget": settings.budget, "progress": False, **more},
         **options,
     )
 
 
-def engine_options(stirring: Stirring, surrogate: str) -> dict[str, Any]:
+def engine_options(stirring: StirSimulator, surrogate: str) -> dict[str, Any]:
     """Options of `inference.Bolfi` that go with one of `settings.SURROGATES`."""
     paper = {**PAPER_RULES, "initial": MIN_SIMULATIONS}
     return {
@@ -70,8 +70,8 @@ def engine_options(stirring: Stirring, surrogate: str) -> dict[str, Any]:
 def confirmed(
     fit: "Fit",
     error: ModelError | None,
-    stirring: Stirring,
-    keep: "Keep",
+    stirring: StirSimulator,
+    compute: "Compute",
     settings: CalibrationSettings,
     advance: Advance,
 ) -> "Fit":
@@ -81,7 +81,7 @@ def confirmed(
         fit: Of the search, beside another error.
         error: Of the simulator; None where the surrogate allows for none.
         stirring: What was simulated.
-        keep: Where simulations are made and kept.
+        compute: Where simulations are made and kept.
         settings: Of the run.
         advance: Called with 1 for each simulation.
 
@@ -100,10 +100,10 @@ def confirmed(
         stirring,
         observed,
         fit.prior,
-        keep,
+        compute,
         settings,
         budget=0,
-        earlier=(theta, search.signals, search.seeds, search.errors.tolist()),
+        earlier=(theta, search.signals, search.seeds, search.why.tolist()),
         confirm=PREDICTIVE_DRAWS,
         progress=advance,
         **beside,

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..models import stirring_error
+from ..simulators import StirSimulator
 from .baseline import Clean, usual_for
 from .noise import sensor_noise
-from .stir_simulator import Stirring
 from .stirs import frame_interval
 
 if TYPE_CHECKING:
@@ -43,7 +43,9 @@ class ModelError:
         return float(np.sqrt(self.usual.autocovariance[0]))
 
 
-def model_error(stirring: Stirring, viscosity: float, clean: Sequence[Clean] = ()) -> ModelError:
+def model_error(
+    stirring: StirSimulator, viscosity: float, clean: Sequence[Clean] = ()
+) -> ModelError:
     """The error in a liquid of so many Pa s, learned from clean recordings where there are any.
 
     Without them it has two parts. One, of size `models.stirring_error`, is correlated as the
@@ -64,7 +66,7 @@ def model_error(stirring: Stirring, viscosity: float, clean: Sequence[Clean] = (
     return ModelError(model_error(stirring_error(viscosity) * np.sqrt(1.0 + share), correlation))
 
 
-def noise_beside(stirring: Stirring, error: ModelError) -> "SumOfNoises":
+def noise_beside(stirring: StirSimulator, error: ModelError) -> "SumOfNoises":
     """The cameras' noise and the simulator's error."""
     from ..inference.criticism import KnownNoise, SumOfNoises
 

@@ -18,8 +18,8 @@ import numpy as np
 
 from ..inputs.fields import PLANE_NAMES
 from ..inputs.strokes import stroke_numbers
+from ..simulators import StirSimulator
 from .check import PosteriorCheck
-from .stir_simulator import Stirring
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
@@ -30,7 +30,7 @@ GRID_POINTS = 61  # of either half of an axis
 
 
 def results_tree(
-    sampled: "DataTree", fit: "Fit", stirring: Stirring, check: PosteriorCheck
+    sampled: "DataTree", fit: "Fit", stirring: StirSimulator, check: PosteriorCheck
 ) -> "DataTree":
     """The engine's tree with the groups of this module."""
     from xarray import Dataset, DataTree

@@ -32,13 +32,11 @@ class Calibration:
         run: What it was made from.
         tree: posterior.nc, in ArviZ's schema; groups as in `calibration.posterior_file`.
         summary: The section "calibrate" of summary.json.
-        key: Digest of the posterior's draws.
     """
 
     run: Run
     tree: "DataTree"
     summary: CalibrationSummary
-    key: str
 
     def __repr__(self) -> str:
         rows = ", ".join(f"{name} {text}" for name, text in self._quantiles().items())
@@ -77,7 +75,7 @@ class Calibration:
         """
         tree = run.required("calibrate")
         summary = CalibrationSummary.from_json(json.loads(tree.attrs["summary"]))
-        return cls(run, tree, summary, key_of(tree))
+        return cls(run, tree, summary)
 
     @property
     def path(self) -> Path:
@@ -88,6 +86,11 @@ class Calibration:
     def record(self) -> Mapping[str, Any]:
         """run.toml: settings, versions, seed and hashes."""
         return self.run.record
+
+    @property
+    def key(self) -> str:
+        """Digest of the posterior's draws, as they are now."""
+        return key_of(self.tree)
 
     @property
     def posterior(self) -> "Dataset":

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..inputs.fields import PLANE_NAMES
 from ..inputs.recording import Recording
 from ..inputs.strokes import resting, speed, strokes
-from .stir_simulator import Stirring
+from ..simulators import StirSimulator
 
 if TYPE_CHECKING:
     from ..inference.criticism import Window
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 SPEED_BINS = 3
 
 
-def windows(stirring: Stirring) -> tuple["Window", ...]:
+def windows(stirring: StirSimulator) -> tuple["Window", ...]:
     """Strokes in each plane, then speeds in both, over the joined samples."""
     from ..inference.criticism import Window
 

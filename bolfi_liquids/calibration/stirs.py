@@ -1,4 +1,4 @@
-"""Stirring recordings as experiments that the engine can criticise."""
+"""StirSimulator recordings as experiments that the engine can criticise."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import Argument, InputError
 from ..inputs.recording import Recording
 from ..inputs.strokes import resting
-from .stir_simulator import Stirring
+from ..simulators import StirSimulator
 from .stir_windows import windows
 
 if TYPE_CHECKING:
@@ -81,7 +81,10 @@ def held_out_noise(one: Recording, fitted: Sequence[Recording]) -> "Autoregressi
 
 
 def stir_experiment(
-    stirring: Stirring, cameras: "AutoregressiveNoise", usual: "UsualResidual | None", label: str
+    stirring: StirSimulator,
+    cameras: "AutoregressiveNoise",
+    usual: "UsualResidual | None",
+    label: str,
 ) -> "Experiment":
     """Recordings of one liquid, with the cameras' noise and the simulator's usual residual."""
     from ..inference.criticism import Experiment, SumOfNoises

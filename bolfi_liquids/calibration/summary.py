@@ -12,10 +12,10 @@ from pydantic import computed_field
 from ..inputs.frame import named_faults
 from ..models import stirring_error
 from ..run.summary import Number, Section
+from ..simulators import StirSimulator
 from .check import PosteriorCheck
 from .model_error import ModelError
 from .noise import irreducible_rms, rms
-from .stir_simulator import Stirring
 
 if TYPE_CHECKING:
     from xarray import DataArray, Dataset, DataTree
@@ -152,7 +152,7 @@ class CalibrationSummary(Section):
         cls,
         tree: "DataTree",
         fit: "Fit",
-        stirring: Stirring,
+        stirring: StirSimulator,
         check: PosteriorCheck,
         error: ModelError | None,
         budget: int,

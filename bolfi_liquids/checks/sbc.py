@@ -8,7 +8,7 @@ weakly dependent. Another seed draws another set.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.model_error import model_error
-from ..calibration.stir_simulator import Stirring, stirring_of
 from ..errors import Argument
 from ..files import given_path
 from ..inputs.bundled import bundled_recording
@@ -29,12 +28,13 @@ from ..inputs.settings import (
     RUNS_PER_POINT,
     SURROGATES,
     SbcSettings,
+    Surrogate,
 )
 from ..progress import progress_bar
-from ..run.compute import HERE, Compute
 from ..run.provenance import versions
 from ..run.run import SIMULATIONS, Run
 from ..seeds import Phase, generator, simulation_seeds
+from ..simulators import StirSimulator, stir_simulator
 from .sbc_file import SurrogateCheck, checked, write_results
 from .sbc_pipelines import (
     SAMPLING,
@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from ..inference import Prior
     from ..inference.checks import Replicates
     from ..inference.criticism import SumOfNoises
+    from ..inference.simulations import Compute
 
 STIRS_PER_CALL = 16  # of the simulator, where there is no executor
 
@@ -57,7 +58,8 @@ def check_sbc(
     recording: str | Path | Recording | None = None,
     *,
     settings: SbcSettings | None = None,
-    compute: Compute = HERE,
+    compute: "Compute | None" = None,
+    progress: bool = True,
 ) -> dict[str, SurrogateCheck]:
     """Simulation-based calibration and coverage of both surrogates with the particle fluid.
 
@@ -67,7 +69,8 @@ def check_sbc(
         out: Directory of results; made if missing.
         recording: Whose gripper path and rig are simulated; None is the bundled stir of water.
         settings: How many of what; None is the default.
-        compute: Where simulations run.
+        compute: Where simulations run; None is this process.
+        progress: Whether to show bars on stderr.
 
     Returns:
         By the surrogate's name.
@@ -76,14 +79,16 @@ def check_sbc(
         InputError: A recording or setting cannot be used, or `out` holds other results.
         ValueError: Of a surrogate, no replicate finished.
     """
-    settings = settings or SbcSettings()
+    from ..inference.simulations import Compute
+
+    settings, compute = settings or SbcSettings(), compute or Compute()
     given = bundled_recording("water") if recording is None else recording
-    stirring = stirring_of(open_recordings(given), settings.particles)
+    stirring = stir_simulator(open_recordings(given), settings.particles)
     prior, out = default_prior(), given_path(out, Argument("out"))
     record = _record(settings, prior, stirring)
     found = {}
     with Run.begun(out, record, resume=True):
-        study = SbcStudy(out, stirring, prior, settings, compute)
+        study = SbcStudy(out, stirring, prior, settings, compute, progress)
         for name in SURROGATES:
             if settings.replicates[name]:
                 made = study.replicates(name)
@@ -92,7 +97,7 @@ def check_sbc(
     return found
 
 
-def _record(settings: SbcSettings, prior: "Prior", stirring: Stirring) -> Mapping[str, Any]:
+def _record(settings: SbcSettings, prior: "Prior", stirring: StirSimulator) -> Mapping[str, Any]:
     from ..inference.engine_version import ENGINE_VERSION
 
     return {
@@ -117,15 +122,17 @@ class SbcStudy:
         prior: Prior of the parameters.
         settings: How many of what.
         compute: Where simulations run.
+        progress: Whether to show bars on stderr.
     """
 
     out: Path
-    stirring: Stirring
+    stirring: StirSimulator
     prior: "Prior"
     settings: SbcSettings
-    compute: Compute = HERE
+    compute: "Compute"
+    progress: bool
 
-    def replicates(self, name: str) -> "Replicates":
+    def replicates(self, name: Surrogate) -> "Replicates":
         """Calibrations of stirs whose truths are known, by one of `SURROGATES`."""
         from .. import inference
 
@@ -149,7 +156,7 @@ class SbcStudy:
             executor=self.compute.executor,
             store=self.out / f"{name}.sqlite",
             identity=self.stirring.identity,
-            progress=self.compute.progress,
+            progress=self.progress,
         )
 
     @property
@@ -180,10 +187,15 @@ class SbcStudy:
         repeated = {name: np.repeat(values, RUNS_PER_POINT) for name, values in theta.items()}
         with (
             SimulationBank(self.out / SIMULATIONS) as bank,
-            progress_bar("simulating stirs for all", count, shown=self.compute.progress) as advance,
+            progress_bar("simulating stirs for all", count, shown=self.progress) as advance,
         ):
-            keep = self.compute.keep(bank, stirring.identity, STIRS_PER_CALL)
-            made = run_missing(stirring.simulate, jobs(repeated, seeds), keep, advance=advance)
+            made = run_missing(
+                stirring.simulate,
+                jobs(repeated, seeds),
+                replace(self.compute, batch=STIRS_PER_CALL, bank=bank),
+                identity=stirring.identity,
+                advance=advance,
+            )
         shape = stirring.observed.shape
         signals = stacked(made, shape).reshape(design, RUNS_PER_POINT, *shape)
         return self.prior.to_array(theta), signals

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.engine_fit import confirmed, engine_options, fit_recordings
-from ..calibration.stir_simulator import Stirring
 from ..inputs.settings import RUNS_PER_POINT, CalibrationSettings
 from ..progress import silent
 from ..seeds import Phase, simulation_seeds
+from ..simulators import StirSimulator
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -65,21 +65,21 @@ class Calibrate:
         timeout: Seconds that one simulation may take; None sets no limit.
     """
 
-    stirring: Stirring
+    stirring: StirSimulator
     prior: "Prior"
     settings: CalibrationSettings
     timeout: float | None = field(default=None, compare=False)  # it decides no draw
 
     def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
         from ..inference import SimulationBank
-        from ..inference.simulations import Keep
+        from ..inference.simulations import Compute
 
         with SimulationBank(":memory:") as bank:
-            keep = Keep(bank, self.stirring.identity, timeout=self.timeout)
+            compute = Compute(timeout=self.timeout, bank=bank)
             settings = replace(self.settings, seed=seed)
-            known = self.stirring, observed, self.prior, keep, settings
+            known = self.stirring, observed, self.prior, compute, settings
             found = fit_recordings(*known, confirm=0, warn=False)
-            fit = confirmed(found, None, self.stirring, keep, settings, silent)
+            fit = confirmed(found, None, self.stirring, compute, settings, silent)
         return fit.sample(seed=seed, **SAMPLING), fit.log_prob
 
 
@@ -100,7 +100,7 @@ class FromBank:
         noise: Of what is observed; None is estimated.
     """
 
-    stirring: Stirring
+    stirring: StirSimulator
     prior: "Prior"
     theta: NDArray[np.float64]
     signals: NDArray[np.float64]

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
-from ..inputs.settings import CalibrationSettings, PourSettings
+from ..inputs.settings import CalibrationSettings, CriticismSettings, PourSettings
 from . import check as cli_check
 from . import guide, import_table
 from . import record as cli_record
@@ -22,9 +22,7 @@ from .grouped import grouped
 from .notices import print_notices
 from .options import (
     CalibrationData,
-    CalibrationOptions,
     CriticismData,
-    EffectOptions,
     ExecutionOptions,
     PourData,
     PourOptions,
@@ -87,7 +85,7 @@ def calibrate(
         list[Path], typer.Argument(metavar="RECORDING", help="NetCDF files, of one liquid.")
     ],
     out: Annotated[Path, typer.Option(metavar="RUN", help="Directory of the run.")],
-    options: CalibrationOptions,
+    settings: CalibrationSettings,
     given: CalibrationData,
     compute: ComputeOptions,
     resume: Annotated[
@@ -103,7 +101,6 @@ def calibrate(
     from ..reporting.warnings import Results
     from ..run.run import check_resumable
 
-    settings = CalibrationSettings(**asdict(options))
     if resume:
         check_resumable(out)
     opened, table = open_recordings(recordings), given.table
@@ -135,7 +132,7 @@ def criticise(
     run: RunArgument,
     data: CriticismData,
     poured: PourData,
-    options: EffectOptions,
+    settings: CriticismSettings,
     compute: ComputeOptions,
 ) -> None:
     """Find which effect the model lacks, where it misses the data."""
@@ -150,9 +147,7 @@ def criticise(
             pours=table,
             held_out_pours=held_out_table,
             cups=poured.cups,
-            effects=options.effects or None,
-            accept=options.accept or None,
-            seed=options.seed,
+            **asdict(settings),
             **where,
         )
     print_findings(criticism)
@@ -168,7 +163,11 @@ def criticise(
 )
 @grouped
 def pour(
-    run: RunArgument, options: PourOptions, execution: ExecutionOptions, compute: ComputeOptions
+    run: RunArgument,
+    options: PourOptions,
+    settings: PourSettings,
+    execution: ExecutionOptions,
+    compute: ComputeOptions,
 ) -> None:
     """Choose the pour that spills least over the posterior.
 
@@ -176,11 +175,10 @@ def pour(
     With --execute nothing is chosen anew: it is a dry run of the chosen pour, unless armed.
     """
     if execution.execute:
-        if options != PourOptions():
+        if options != PourOptions() or settings != PourSettings():
             raise typer.BadParameter(
-                "--execute carries out the pour that RUN has chosen already; --cups, --given, "
-                "--liquid, --budget, --iterations, --risk and --force belong to the choice, which "
-                "is made without --execute"
+                "--execute carries out the pour that RUN has chosen already; the other options "
+                "belong to the choice, which is made without --execute"
             )
         cli_record.execute(run, execution)
         return
@@ -188,18 +186,14 @@ def pour(
     from ..pouring.choose import choose_pour
     from ..reporting.warnings import Results
 
-    # refused before anything of the run is read
-    PourSettings(budget=options.budget, iterations=options.iterations, risk=options.risk)
     cups, table = cups_of(options.cups), options.table
     with compute.arguments() as where:
         chosen = choose_pour(
             run,
             cups,
             given=table,
-            budget=options.budget,
-            iterations=options.iterations,
-            risk=options.risk,
             force=options.force,
+            **asdict(settings),
             **where,
         )
     print_pour(chosen)

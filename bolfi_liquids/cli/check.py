@@ -1,6 +1,5 @@
 """The command group `check`: long checks, which go on where they were stopped."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +10,6 @@ from .compute import StudyComputeOptions
 from .errors import FAILED
 from .examples import examples
 from .grouped import grouped
-from .options import SbcOptions
 
 app = typer.Typer(help="Long checks; a killed one goes on.", no_args_is_help=True)
 
@@ -21,7 +19,7 @@ app = typer.Typer(help="Long checks; a killed one goes on.", no_args_is_help=Tru
 )
 @grouped
 def sbc(
-    options: SbcOptions,
+    settings: SbcSettings,
     compute: StudyComputeOptions,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Directory of the results.")] = Path(
         "runs/sbc"
@@ -39,7 +37,6 @@ def sbc(
     """
     from ..checks.sbc import check_sbc
 
-    settings = SbcSettings(**asdict(options))
     with compute.opened() as opened:
         found = check_sbc(out, recording, settings=settings, compute=opened)
     for name, check in found.items():

@@ -10,7 +10,7 @@ import typer
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from ..run.compute import Compute
+    from ..inference.simulations import Compute
 
 WorkersOption = Annotated[
     int | None,
@@ -51,7 +51,7 @@ class ComputeOptions:
     @contextmanager
     def opened(self) -> "Iterator[Compute]":
         """With the executor that `workers` and `dask` name; it is closed afterwards."""
-        from ..run.compute import Compute
+        from ..inference.simulations import Compute
 
         with open_executor_of(self.workers, self.dask) as executor:
             yield Compute(executor, self.timeout)

@@ -1,10 +1,14 @@
-"""Options that several commands share, declared once as a frozen dataclass."""
+"""Options that are declared as the fields of a frozen dataclass."""
 
 import inspect
 from collections.abc import Callable
 from dataclasses import MISSING, fields, is_dataclass
 from functools import wraps
-from typing import Any, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+
+import typer
+from pydantic.dataclasses import is_pydantic_dataclass
+from pydantic.fields import FieldInfo
 
 
 def grouped(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -14,8 +18,8 @@ def grouped(command: Callable[..., Any]) -> Callable[..., Any]:
     the place of the parameter.
 
     Args:
-        command: Parameters and the dataclasses' fields carry Typer's annotations; no two have
-            one name.
+        command: A dataclass is one of `inputs.settings`, or its fields carry Typer's annotations;
+            no two fields or parameters have one name.
     """
     hints = get_type_hints(command, include_extras=True)
     parameters = inspect.signature(command).parameters
@@ -44,7 +48,8 @@ def grouped(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _of_fields(group: Any) -> list[inspect.Parameter]:
-    hints = get_type_hints(group, include_extras=True)
+    settings = is_pydantic_dataclass(group)
+    hints = _of_settings(group) if settings else get_type_hints(group, include_extras=True)
     return [
         inspect.Parameter(
             field.name,
@@ -54,3 +59,19 @@ def _of_fields(group: Any) -> list[inspect.Parameter]:
         )
         for field in fields(group)
     ]
+
+
+def _of_settings(group: Any) -> dict[str, Any]:
+    """Typer's annotations of settings; their own rules check the values."""
+    return {name: _typed(field) for name, field in group.__pydantic_fields__.items()}
+
+
+def _typed(field: FieldInfo) -> Any:
+    """How one setting is typed: several names are one option that is repeated."""
+    kind: Any = field.annotation
+    if kind == tuple[str, ...] | None:
+        return Annotated[list[str] | None, typer.Option(help=field.description)]
+    if get_origin(kind) is Literal:
+        choices = "|".join(get_args(kind))
+        return Annotated[str, typer.Option(metavar=choices, help=field.description)]
+    return Annotated[kind, typer.Option(help=field.description)]

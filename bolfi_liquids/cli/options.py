@@ -6,16 +6,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..inputs.settings import (
-    RISKS,
-    SAMPLERS,
-    SURROGATES,
-    CalibrationSettings,
-    CriticismSettings,
-    PourSettings,
-    SbcSettings,
-)
-
 if TYPE_CHECKING:
     from ..inputs.pour_table import PourTable
 
@@ -27,35 +17,12 @@ CupsOption = Annotated[
     Path | None,
     typer.Option("--cups", metavar="FILE", help="cups.toml; without it, the bundled one."),
 ]
-SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers.")]
 ParticlesOption = Annotated[
     int,
     typer.Option(
         "--particles", help="Number of particles; 0: cells follow the stick, or the cup that pours."
     ),
 ]
-
-
-@dataclass(frozen=True)
-class CalibrationOptions:
-    """Settings of `calibrate`, as `CalibrationSettings` describes them."""
-
-    budget: Annotated[int, typer.Option(help="Simulations of the search.")] = (
-        CalibrationSettings.budget
-    )
-    surrogate: Annotated[
-        str, typer.Option(metavar="|".join(SURROGATES), help="What is emulated, see guide priors.")
-    ] = CalibrationSettings.surrogate
-    sampler: Annotated[
-        str, typer.Option(metavar="|".join(SAMPLERS), help="Sampler of the posterior.")
-    ] = CalibrationSettings.sampler
-    seed: SeedOption = CalibrationSettings.seed
-    particles: ParticlesOption = CalibrationSettings.particles
-    batch: Annotated[int, typer.Option(help="Simulations run at the same time.")] = (
-        CalibrationSettings.batch
-    )
-
-
 LiquidOption = Annotated[
     str | None,
     typer.Option("--liquid", metavar="NAME", help="Whose pours count, if the table has several."),
@@ -128,22 +95,8 @@ class PourData(GivenPourOptions):
 
 
 @dataclass(frozen=True)
-class EffectOptions:
-    """Effects that a criticism considers and accepts."""
-
-    effects: Annotated[
-        list[str] | None, typer.Option(metavar="EFFECT", help="To consider; all if not given.")
-    ] = None
-    accept: Annotated[
-        list[str] | None,
-        typer.Option(metavar="EFFECT", help="Effect that joins the model whatever the verdict."),
-    ] = None
-    seed: SeedOption = CriticismSettings.seed
-
-
-@dataclass(frozen=True)
 class PourOptions:
-    """What decides the choice of a pour."""
+    """Cups, pours that were made, and whether a bad fit may be poured."""
 
     cups: CupsOption = None
     given: Annotated[
@@ -153,19 +106,7 @@ class PourOptions:
         ),
     ] = None
     liquid: LiquidOption = None
-    budget: Annotated[int, typer.Option(help="Pours simulated at most, 24 to 100.")] = (
-        PourSettings.budget
-    )
     pours: Annotated[str | None, typer.Option(hidden=True)] = None
-    iterations: Annotated[int, typer.Option(help="Angular velocities tried.")] = (
-        PourSettings.iterations
-    )
-    risk: Annotated[
-        str,
-        typer.Option(
-            metavar="|".join(RISKS), help="Spillage to keep low: the mean, or the worst tenth's."
-        ),
-    ] = PourSettings.risk
     force: Annotated[
         bool, typer.Option("--force", help="Choose a pour even though the fit is bad.")
     ] = False
@@ -205,29 +146,6 @@ class ExecutionOptions:
 
     def __post_init__(self) -> None:
         _need(self, "--execute", self.execute, ("arm", "emulator", "rig", "despite_bad_fit"))
-
-
-@dataclass(frozen=True)
-class SbcOptions:
-    """Settings of `check sbc`, as `SbcSettings` describes them."""
-
-    runs: Annotated[int, typer.Option(help="Replicates of the emulator of the inclination.")] = (
-        SbcSettings.runs
-    )
-    sequential: Annotated[int, typer.Option(help="Replicates of the paper's surrogate.")] = (
-        SbcSettings.sequential
-    )
-    design: Annotated[
-        int, typer.Option(help="Points that the emulator's replicates share, each stirred twice.")
-    ] = SbcSettings.design
-    budget: Annotated[int, typer.Option(help="Simulations of each replicate's search.")] = (
-        SbcSettings.budget
-    )
-    noise_deg: Annotated[float, typer.Option("--noise", help="Of the cameras [deg].")] = (
-        SbcSettings.noise_deg
-    )
-    particles: ParticlesOption = SbcSettings.particles
-    seed: SeedOption = SbcSettings.seed
 
 
 def _need(options: object, needed: str, given: object, names: tuple[str, ...]) -> None:

@@ -1,7 +1,6 @@
 """The command `record`: a dry run unless a person arms it and types the sentence."""
 
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from .grouped import grouped
 from .options import ExecutionOptions, RigOption
 
 if TYPE_CHECKING:
-    from ..hardware import Check, HiddenLiquid, Rig
+    from ..hardware import Check, HiddenLiquid
     from ..online.online_choice import OnlineChoice
 
 OUT = Path("runs/recording")
@@ -37,7 +36,7 @@ class ArmOptions:
         bool, typer.Option("--arm", help="Move the arm, once a typed sentence allows it.")
     ] = False
     emulator: Annotated[
-        bool, typer.Option("--emulator", help="All of it with an emulator and rendered cameras.")
+        bool, typer.Option("--emulator", help="All of it with an emulated arm and cameras.")
     ] = False
     viscosity: Annotated[
         float | None, typer.Option(help="Of the emulated liquid [Pa s]; else 1.")
@@ -117,13 +116,14 @@ def record(
     from ..inputs.rigs import rig_of
     from ..online.record import record_online
     from ..reporting.warnings import Results
+    from ..robot.record import dry_stir
     from ..robot.record import record as run_record
     from .printed import print_calibration, print_warnings
     from .tables import print_recording
 
     opened = rig_of(rig)
     if not (moved.arm or moved.emulator):
-        _dry_run(opened, cycles, out)
+        _tell_dry(*dry_stir(opened, cycles, out))
         return
     ask = typed_sentence if moved.arm else None
     given: dict[str, Any] = {"out": out, "ask": ask, "emulate": moved.emulate}
@@ -168,12 +168,12 @@ def aborted_is_told() -> Iterator[None]:
 def execute(run: Path, how: ExecutionOptions) -> None:
     """`pour --execute`: a dry run unless armed."""
     from ..inputs.rigs import rig_of
-    from ..robot.pour import execute_pour
+    from ..robot.pour import dry_pour, execute_pour
 
     _one_of(how.arm, how.emulator)
     opened = rig_of(how.rig)
     if not (how.arm or how.emulator):
-        _dry_pour(run, opened)
+        _tell_dry(*dry_pour(run, opened))
         return
     with aborted_is_told():
         done = execute_pour(
@@ -211,38 +211,12 @@ def typed_sentence(plan: str) -> str:
     return typer.prompt(f"Type '{CONFIRMATION}' to go on", default="", show_default=False)
 
 
-def _dry_run(rig: "Rig", cycles: int | None, out: Path) -> None:
-    from ..hardware.session.confirmation import describe
-    from ..robot.stir import dry_run, plan_stir
-
-    if out.is_dir() and any(out.iterdir()):
-        raise InputError("holds files already", where=str(out), fix="give a new directory: --out")
-    plan = plan_stir(rig, cycles)
-    typer.echo(describe(plan.paths, rig, "stirring"))
-    with tempfile.TemporaryDirectory(dir=_nearest(out)) as directory:
-        checks = dry_run(rig, plan, Path(directory))
-    _tell_dry(checks)
-
-
-def _dry_pour(run: Path, rig: "Rig") -> None:
-    from ..robot.pour import dry_pour
-
-    with tempfile.TemporaryDirectory(dir=_nearest(run)) as directory:
-        text, checks = dry_pour(run, rig, Path(directory))
-    typer.echo(text)
-    _tell_dry(checks)
-
-
-def _nearest(out: Path) -> Path:
-    """A directory that exists, on the disk that would be written to."""
-    return next(one for one in (out, *out.absolute().parents) if one.is_dir())
-
-
-def _tell_dry(checks: "list[Check]") -> None:
+def _tell_dry(plan: str, checks: "list[Check]") -> None:
     from rich.console import Console
 
     from .tables import print_checks
 
+    typer.echo(plan)
     print_checks(checks, Console())
     if not all(check.ok for check in checks):
         typer.echo("dry run: nothing was moved; mend what says no, or try it out with --emulator")

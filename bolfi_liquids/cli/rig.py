@@ -81,30 +81,18 @@ def calibrate_cameras(
     ] = None,
 ) -> None:
     """Learn a camera's lens from a board and a plumb line."""
-    from ..robot.camera_calibration import Pictures, calibrate_view, write_board
+    from ..robot.camera_calibration import calibrate_view, write_board
 
     if print_board is not None:
         typer.echo(f"{write_board(print_board)}: print it, measure a square, glue it on a plate")
         return
-    given = Pictures(pictures.square / 100, pictures.boards, pictures.plumb_line)
-    for line in calibrate_view(rig, view, given, out=pictures.out):
-        typer.echo(line)
-
-
-@app.command(epilog=examples("rig emulate --viscosity 1"))
-def emulate(
-    rig: RigOption = None,
-    address: Annotated[
-        str | None, typer.Option(metavar="127.x.y.z", help="Where it listens; else a free one.")
-    ] = None,
-    viscosity: Annotated[float, typer.Option(help="Of the liquid in the cup [Pa s].")] = 1.0,
-) -> None:
-    """Emulate the robot's controller until Ctrl-C.
-
-    Any client of a real controller may connect to it, ours by `host` under `robot` in rig.toml.
-    """
-    from ..inputs.rigs import rig_of
-    from ..robot.lone_emulator import emulator_until_interrupted
-
-    for line in emulator_until_interrupted(rig_of(rig), address, viscosity):
+    told = calibrate_view(
+        rig,
+        view,
+        square=pictures.square / 100,
+        boards=pictures.boards,
+        plumb_line=pictures.plumb_line,
+        out=pictures.out,
+    )
+    for line in told:
         typer.echo(line)

@@ -2,14 +2,13 @@
 
 import logging
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..calibration.baseline import Clean, clean_residuals, usual_elsewhere, usual_for
 from ..calibration.result import Calibration
-from ..calibration.stir_simulator import Stirring, stirring_of
 from ..calibration.stirs import camera_noise, effects_of, held_out_noise, stir_experiment
 from ..errors import Argument, InputError
 from ..inputs.frame import frame_warnings
@@ -21,6 +20,7 @@ from ..progress import phases
 from ..run.compute import open_compute
 from ..run.given_pours import keep_pours
 from ..run.run import Run, RunOrPath
+from ..simulators import StirSimulator, stir_simulator
 from .criticism_file import criticism_tree
 from .findings import Findings
 from .inputs import ComparedData, Inputs, check_effects, open_inputs
@@ -31,7 +31,8 @@ from .summary import CriticismSummary
 
 if TYPE_CHECKING:
     from .. import inference
-    from ..inference.simulations import Workers
+    from ..inference.criticism import Report
+    from ..inference.simulations import Compute, Workers
     from ..models import Cups
 
 logger = logging.getLogger(__name__)
@@ -48,6 +49,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     effects: str | Sequence[str] | None = None,
     accept: str | Sequence[str] | None = None,
     seed: int = 0,
+    batch: int = CriticismSettings.batch,
     executor: "Workers | None" = None,
     timeout: float | None = None,
     progress: bool = True,
@@ -70,6 +72,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         effects: Names in `models.EFFECTS` to consider; None is all of them.
         accept: Effects that join the model whatever the verdict.
         seed: Seed of all random draws.
+        batch: Simulations in one call, where there is no executor.
         executor, timeout: See `calibrate`.
         progress: Whether to show phases on stderr.
 
@@ -80,11 +83,9 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         RuntimeError: Simulations failed; the message says how.
     """
     started = time.perf_counter()
-    settings = CriticismSettings(
-        effects=_names("effects", effects),
-        accept=_names("accept", accept),
-        seed=seed,
-    )
+    # their rules make them tuples
+    named: dict[str, Any] = {"effects": effects, "accept": accept}
+    settings = CriticismSettings(**named, seed=seed, batch=batch)
     check_effects(settings)
     given = ComparedData(
         open_recordings(held_out, Argument("held_out")),
@@ -104,49 +105,32 @@ def criticise(  # noqa: PLR0913  the one call that most users make
             if (finished := Criticism.of(run)) and finished.made_from == inputs.made_from:
                 run.write_summary()
                 return finished
-            from ..inference.criticism import Keeping
-
             with run.bank() as bank, phases(shown=progress) as report:
-                where = {"executor": compute.executor, "timeout": compute.timeout}
-                keeping = Keeping(bank, settings.batch, settings.seed, report, **where)
-                findings = _find(base, inputs, keeping)
+                own = replace(compute, batch=settings.batch, bank=bank)
+                findings = _find(base, inputs, own, report)
                 tree = criticism_tree(findings)
         summary = CriticismSummary.from_findings(findings, tree, time.perf_counter() - started)
         run.keep("criticise", tree, inputs.made_from, summary.to_json())
         return Criticism.made(base, tree)
 
 
-def _names(argument: str, given: str | Sequence[str] | None) -> tuple[str, ...] | None:
-    """One name or several.
-
-    Raises:
-        InputError: Something else was given.
-    """
-    if given is None:
-        return None
-    several = isinstance(given, Iterable) and not isinstance(given, str)
-    listed = list(given) if several else [given]
-    names = tuple(one for one in listed if isinstance(one, str))
-    if len(names) < len(listed):
-        raise InputError(
-            f"{given!r:.80}", where=Argument(argument), fix="give names of effects, or none"
-        )
-    return names
-
-
 def _find(
-    calibration: Calibration, inputs: Inputs, keeping: "inference.criticism.Keeping"
+    calibration: Calibration, inputs: Inputs, compute: "Compute", report: "Report"
 ) -> Findings:
     clean = clean_residuals(
         inputs.baseline,
         inputs.stirring.setups[0].particles,
         calibration.prior,
         effects_of("stir"),
-        keeping=keeping,
+        compute=compute,
+        report=report,
     )
     cameras = camera_noise(inputs.stirring.recordings)
-    stirs = _stirs(calibration, inputs, cameras, clean, keeping)
-    poured = inputs.table and _pours(calibration, stirs, inputs.table, inputs, keeping)
+    # executor, timeout, batch and bank, as the engine takes them
+    how = vars(compute) | {"seed": inputs.settings.seed, "level": inputs.level}
+    stirs = _stirs(calibration, inputs, cameras, clean, how | {"report": report})
+    how["report"] = lambda phase, n: report(f"pours, {phase}", n)
+    poured = inputs.table and _pours(calibration, stirs, inputs.table, inputs, how)
     return Findings(calibration, inputs, cameras, tuple(clean), stirs, poured)
 
 
@@ -155,7 +139,7 @@ def _stirs(
     inputs: Inputs,
     cameras: "inference.criticism.AutoregressiveNoise",
     clean: Sequence[Clean],
-    keeping: "inference.criticism.Keeping",
+    how: Mapping[str, Any],
 ) -> "inference.criticism.Criticism":
     from .. import inference
 
@@ -170,16 +154,15 @@ def _stirs(
         held_out=[_kept_back(one, stirring, clean, viscosity) for one in inputs.held_out],
         proposals=stir_proposals(stirring, cameras, usual_elsewhere(stirring, clean, viscosity)),
         accept=_among(settings.accept, extensions),
-        level=inputs.level,
         plan=settings.stir_plan,
-        keeping=keeping,
+        **how,
     )
 
 
 def _kept_back(
-    recording: Recording, fitted: Stirring, clean: Sequence[Clean], viscosity: float | None
+    recording: Recording, fitted: StirSimulator, clean: Sequence[Clean], viscosity: float | None
 ) -> "inference.criticism.Experiment":
-    own = stirring_of([recording], fitted.setups[0].particles)
+    own = stir_simulator([recording], fitted.setups[0].particles)
     cameras = held_out_noise(recording, fitted.recordings)
     return stir_experiment(own, cameras, usual_for(own, clean, viscosity), recording.path.name)
 
@@ -189,7 +172,7 @@ def _pours(
     stirs: "inference.criticism.Criticism",
     table: PourTable,
     inputs: Inputs,
-    keeping: "inference.criticism.Keeping",
+    how: Mapping[str, Any],
 ) -> "inference.criticism.Criticism":
     """The same for pours, with the posterior of the stirs as the prior."""
     from .. import inference
@@ -217,9 +200,8 @@ def _pours(
         ],
         proposals=pour_proposals(inputs.cups, density),
         accept=_among(settings.accept, extensions),
-        level=inputs.level,
         plan=settings.pour_plan,
-        keeping=replace(keeping, report=lambda phase, n: keeping.report(f"pours, {phase}", n)),
+        **how,
     )
 
 

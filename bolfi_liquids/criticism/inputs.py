@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..calibration.baseline import check_baseline, check_rig
 from ..calibration.result import Calibration
-from ..calibration.stir_simulator import Stirring, same_liquid, stirring_of
 from ..calibration.stirs import names_of_effects
 from ..errors import Argument, InputError
 from ..inputs.pour_table import Pours, PourTable, check_scene, table_and_cups, table_of
 from ..inputs.recording import Recording
 from ..inputs.settings import FALSE_ALARM_RATE, CriticismSettings
+from ..simulators import StirSimulator, same_liquid, stir_simulator
 
 if TYPE_CHECKING:
     from ..models import Cups
@@ -37,7 +37,7 @@ class Inputs:
     """
 
     after: str
-    stirring: Stirring
+    stirring: StirSimulator
     held_out: tuple[Recording, ...]
     baseline: tuple[Recording, ...]
     left_out: tuple[str, ...]
@@ -99,7 +99,7 @@ def open_inputs(
         InputError: Something cannot be used.
     """
     particles = int(calibration.record["settings"]["particles"])
-    stirring = stirring_of(calibration.run.recordings, particles)
+    stirring = stir_simulator(calibration.run.recordings, particles)
     kept_back, believed = given.held_out, given.baseline
     _check_held_out(stirring, kept_back)
     others = _others(believed, [*stirring.recordings, *kept_back])
@@ -133,7 +133,7 @@ def _others(baseline: list[Recording], used: Sequence[Recording]) -> tuple[Recor
     return tuple({r.hash: r for r in baseline if r.hash not in taken}.values())
 
 
-def _check_held_out(stirring: Stirring, held_out: Sequence[Recording]) -> None:
+def _check_held_out(stirring: StirSimulator, held_out: Sequence[Recording]) -> None:
     fitted = {recording.hash for recording in stirring.recordings}
     seen: set[str] = set()
     for recording in held_out:

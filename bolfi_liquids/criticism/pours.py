@@ -1,17 +1,15 @@
 """Outcomes of pours as an experiment that the engine can criticise."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..inputs.pour_table import PourTable
-from ..inputs.prior import split_parameters
-from ..run.fluid_simulator import FluidSimulator
 from ..seeds import Phase, simulation_seeds
+from ..simulators import RATE, Batched, PourSimulator
 from .pour_noise import PourNoise
 
 if TYPE_CHECKING:
@@ -28,72 +26,59 @@ OUTCOMES = ("spilled", "retained")
 
 
 @dataclass(frozen=True)
-class Pouring(FluidSimulator):
-    """Pours of one liquid as a simulator.
+class Fractions:
+    """Spilled and retained fractions (B, 2, A) of liquids (B,), each pouring all actions.
+
+    Each angular velocity of a run is poured once, with a packing of its own, which all of its
+    distances share: they differ by the receiver alone.
 
     Attributes:
         angular_velocity, distance: Of each pour [rad/s], [m], shape (A,).
-        cups: Source and receiver.
-        density: Of the liquid [kg/m3].
     """
 
     angular_velocity: NDArray[np.float64]
     distance: NDArray[np.float64]
-    cups: "Cups"
-    density: float
 
-    def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
-        """Spilled and retained fractions (B, 2, A) of liquids (B,), each pouring all actions.
-
-        Each angular velocity of a run is poured once, with a packing of its own, which all of its
-        distances share: they differ by the receiver alone.
-        """
+    def __call__(
+        self, batch: Batched, theta: Mapping[str, NDArray], seeds: NDArray
+    ) -> NDArray[np.float64]:
         from .. import models
 
         rates, at = np.unique(self.angular_velocity, return_inverse=True)
         runs = len(seeds)
-        liquid, effects = split_parameters(
-            {name: np.repeat(values, len(rates)) for name, values in theta.items()}
-        )
+        each = {name: np.repeat(values, len(rates)) for name, values in theta.items()}
         own = [simulation_seeds(int(one), Phase.RUNS_OF_POURS, len(rates)) for one in seeds]
-        landed = models.landings(
-            models.Liquid(**liquid, density=self.density),
-            np.tile(rates, runs),
-            self.cups,
-            np.ravel(own),
-            effects=effects,
-        )
+        pours = batch({**each, RATE: np.tile(rates, runs)}, np.ravel(own))
+        landed = models.landings(*pours)
         rows = np.add.outer(len(rates) * np.arange(runs), at).ravel()
         result = models.Landings(landed.position[rows], landed.retained[rows]).into(
-            np.tile(self.distance, runs), self.cups.receiver.radius
+            np.tile(self.distance, runs), pours.cups.receiver.radius
         )
         outcomes = [np.asarray(getattr(result, name), np.float64) for name in OUTCOMES]
         return np.stack([outcome.reshape(runs, -1) for outcome in outcomes], axis=1)
 
     @property
-    def identity(self) -> str:
-        """A text that two equal experiments share."""
+    def settings(self) -> list[Any]:
+        """The actions."""
         actions = [self.angular_velocity.tolist(), self.distance.tolist()]
-        return json.dumps(
-            [Phase.RUNS_OF_POURS.value, self.cups.settings(), self.density, actions], sort_keys=True
-        )
+        return [Phase.RUNS_OF_POURS.value, actions]
 
 
 def pour_experiment(table: PourTable, cups: "Cups", density: float) -> "Experiment":
     """The pours of a table, each outcome a window of its own."""
     from ..inference.criticism import Experiment, Window
 
-    pouring = Pouring(table.angular_velocity, table.distance, cups, density)
+    pours = PourSimulator(cups, density, Fractions(table.angular_velocity, table.distance))
     every = np.ones(table.observed.shape, bool)
     windows = [
         Window({"outcome": name}, every & (np.arange(len(OUTCOMES)) == k)[:, None])
         for k, name in enumerate(OUTCOMES)
     ]
     return Experiment(
-        pouring.simulate,
+        pours.simulate,
         table.observed,
         PourNoise(table.angular_velocity, table.distance),
-        pouring.identity,
+        pours.identity,
         table.path.name,
         tuple(windows),
     )

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..calibration.stir_simulator import Stirring
 from ..inputs.recording import Recording, Trajectory
 from ..inputs.strokes import speed
+from ..simulators import PourSimulator, StirSimulator
 from .pour_noise import PourNoise
-from .pours import OUTCOMES, Pouring
+from .pours import OUTCOMES, Fractions
 
 if TYPE_CHECKING:
     from ..inference.criticism import Noise, Proposal, UsualResidual
@@ -38,7 +38,7 @@ class Planned:
 
 
 def stir_proposals(
-    stirring: Stirring, noise: "Noise", usual: "UsualResidual | None"
+    stirring: StirSimulator, noise: "Noise", usual: "UsualResidual | None"
 ) -> list["Proposal"]:
     """The first recording's rig on other paths, seen with the same cameras' noise.
 
@@ -70,7 +70,7 @@ def stir_proposals(
     made = []
     for label, path in paths.items():
         planned = Planned(Trajectory(path.time, path.position), recording)
-        own = Stirring((planned,), (setup,))  # type: ignore[arg-type]
+        own = StirSimulator((planned,), (setup,))  # type: ignore[arg-type]
         shape = (len(path.time), 2)
         made.append(Proposal(own.simulate, all_noise, shape, own.identity, label))
     return made
@@ -84,16 +84,17 @@ def pour_proposals(cups: "Cups", density: float, tried: int = 2) -> list["Propos
     made = []
     for rate in rates:
         distance = np.linspace(*cups.distance_range, 4)[1:3]
-        pouring = Pouring(np.full(len(distance), rate), distance, cups, density)
+        actions = Fractions(np.full(len(distance), rate), distance)
+        pours = PourSimulator(cups, density, actions)
         label = f"pours at {np.degrees(rate):.0f} deg/s from " + " and ".join(
             f"{100 * d:.1f}" for d in distance
         )
         made.append(
             Proposal(
-                pouring.simulate,
-                PourNoise(pouring.angular_velocity, pouring.distance),
+                pours.simulate,
+                PourNoise(actions.angular_velocity, actions.distance),
                 (len(OUTCOMES), len(distance)),
-                pouring.identity,
+                pours.identity,
                 f"{label} cm",
             )
         )

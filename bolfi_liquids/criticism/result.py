@@ -9,7 +9,7 @@ from ..calibration.result import Calibration
 from ..calibration.summary import Fitted
 from ..drawing import given_or_shown
 from ..inference.criticism.verdict_kind import VerdictKind
-from ..run.run import Run, RunOrPath, key_of
+from ..run.run import Run, RunOrPath
 from ..wording import html_table, sentence, spoken
 from .summary import CriticismSummary
 
@@ -106,7 +106,7 @@ class Criticism:
         summary = self.base.summary.of_posterior(
             posterior, self.summary.parameters, self.summary.best, self._fitted
         )
-        return replace(self.base, tree=tree, summary=summary, key=key_of(self.tree))
+        return replace(self.base, tree=tree, summary=summary)
 
     @property
     def _fitted(self) -> Fitted:

@@ -1,9 +1,12 @@
-"""Settings of the commands, checked before anything is simulated."""
+"""Settings of the commands, declared once: keyword, option with its help, and field of run.toml.
 
-from collections.abc import Callable
+They are checked before anything is simulated.
+"""
+
+from collections.abc import Callable, Iterable
 from functools import wraps
 from operator import index
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, dataclass_transform
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, dataclass_transform, get_args
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic.dataclasses import dataclass as validated_dataclass
@@ -13,9 +16,13 @@ from ..errors import Argument, InputError
 if TYPE_CHECKING:
     from ..inference.criticism import Plan
 
-SURROGATES = ("signal", "discrepancy")
-SAMPLERS = ("nuts", "emcee")
-RISKS = ("mean", "cvar")
+Surrogate = Literal["signal", "discrepancy"]
+"""What is emulated: the inclination itself, or, as in the paper, the discrepancy."""
+SURROGATES: tuple[Surrogate, ...] = get_args(Surrogate)
+Sampler = Literal["nuts", "emcee"]
+"""Of the posterior."""
+Risk = Literal["mean", "cvar"]
+"""Spillage to keep low: the mean, or that of the worst tenth of the draws."""
 
 PAPER_RULES = {"acquisition": "lcb", "threshold": "min_mean"}
 """Engine options that go with the paper's surrogate, on which the results were measured."""
@@ -43,17 +50,6 @@ MIN_PARTICLES = 100
 """With fewer, the stick is thinner than the gaps between them."""
 
 
-def one_of(choices: tuple[str, ...]) -> AfterValidator:
-    """A rule for texts."""
-
-    def check(value: str) -> str:
-        if value not in choices:
-            raise ValueError(f"Input should be {' or '.join(map(repr, choices))}")
-        return value
-
-    return AfterValidator(check)
-
-
 def _as_many(value: int) -> int:
     if 0 < value < MIN_PARTICLES:
         raise ValueError(f"Input should be 0 or at least {MIN_PARTICLES}")
@@ -68,19 +64,30 @@ def _plain_integer(value: Any) -> Any:
         return value
 
 
-def _each_once(names: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(names))
+def _as_names(value: Any) -> Any:
+    """One name or several, each once; None for none."""
+    several = value if isinstance(value, Iterable) and not isinstance(value, str) else [value]
+    names = [one for one in several if one is not None]
+    if not all(isinstance(one, str) for one in names):
+        raise ValueError("Input should be names, or none")
+    return tuple(dict.fromkeys(names)) or None
 
 
 Integer = Annotated[int, BeforeValidator(_plain_integer)]
-Seed = Annotated[Integer, Field(ge=0, le=LARGEST_SEED)]
+Seed = Annotated[Integer, Field(ge=0, le=LARGEST_SEED, description="Seed of all random numbers.")]
 Count = Annotated[Integer, Field(ge=1, le=MAX_COUNT)]
 Simulations = Annotated[Integer, Field(ge=MIN_SIMULATIONS, le=MAX_SIMULATIONS)]
-Particles = Annotated[Integer, Field(ge=0, le=MAX_PARTICLES), AfterValidator(_as_many)]
-"""0: cells follow the stick, or the cup that pours."""
+Particles = Annotated[
+    Integer,
+    Field(
+        ge=0,
+        le=MAX_PARTICLES,
+        description="Number of particles; 0: cells follow the stick, or the cup that pours.",
+    ),
+    AfterValidator(_as_many),
+]
 Pours = Annotated[Integer, Field(ge=MIN_POURS, le=MAX_POURS)]
-Surrogate = Annotated[str, one_of(SURROGATES)]
-Names = Annotated[tuple[str, ...], AfterValidator(_each_once)]
+Names = Annotated[tuple[str, ...] | None, BeforeValidator(_as_names)]
 
 T = TypeVar("T")
 
@@ -118,50 +125,40 @@ def checked(where: str = "") -> Callable[[type[T]], type[T]]:
     return decorate
 
 
+def told(text: str, **limits: Any) -> Any:
+    """The help of an option, and limits of its values."""
+    return Field(description=text, **limits)
+
+
 @checked()
 class CalibrationSettings:
-    """What decides a calibration besides its recordings and prior.
+    """What decides a calibration besides its recordings and prior."""
 
-    Attributes:
-        budget: Simulations of the search.
-        batch: Simulations run at the same time.
-        seed: Seed of all random draws.
-        surrogate: "signal", which emulates the inclination itself, or "discrepancy", the paper's.
-        particles: Number of particles of the simulated liquid; 0: cells follow the stick.
-        sampler: "nuts" or "emcee".
-        chains: Number of chains; R-hat needs at least two.
-        draws: Draws kept of each chain.
-    """
-
-    budget: Simulations = 20
-    batch: Count = 4
+    budget: Annotated[Simulations, told("Simulations of the search.")] = 20
+    batch: Annotated[Count, told("Simulations run at the same time.")] = 4
     seed: Seed = 0
-    surrogate: Surrogate = "signal"
+    surrogate: Annotated[Surrogate, told("What is emulated, see guide priors.")] = "signal"
     particles: Particles = 0
-    sampler: Annotated[str, one_of(SAMPLERS)] = "nuts"
-    chains: Annotated[Integer, Field(ge=2, le=1000)] = 4
-    draws: Annotated[Integer, Field(ge=4, le=MAX_COUNT)] = 1000
+    sampler: Annotated[Sampler, told("Sampler of the posterior.")] = "nuts"
+    chains: Annotated[Integer, told("Chains of the sampler; R-hat needs two.", ge=2, le=1000)] = 4
+    draws: Annotated[Integer, told("Draws kept of each chain.", ge=4, le=MAX_COUNT)] = 1000
 
 
 @checked()
 class SbcSettings:
-    """What decides a check of calibrations besides the recording that gives path and rig.
+    """What decides a check of calibrations besides the recording that gives path and rig."""
 
-    Attributes:
-        runs: Replicates of the emulator of the inclination, which share their simulations.
-        sequential: Replicates of the paper's surrogate, each with simulations of its own.
-        design: Points that the former share, each stirred twice.
-        budget: Simulations of each one's search.
-        noise_deg: Standard deviation of the cameras' noise, added to each simulated sample [deg].
-        particles: Number of particles of the simulated liquid; 0: cells follow the stick.
-        seed: Seed of all random draws.
-    """
-
-    runs: Annotated[Integer, Field(ge=0, le=MAX_COUNT)] = 200
-    sequential: Annotated[Integer, Field(ge=0, le=MAX_COUNT)] = 40
-    design: Simulations = 512
-    budget: Simulations = 20
-    noise_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 0.1
+    runs: Annotated[
+        Integer, told("Replicates of the emulator of the inclination.", ge=0, le=MAX_COUNT)
+    ] = 200
+    sequential: Annotated[
+        Integer, told("Replicates of the paper's surrogate.", ge=0, le=MAX_COUNT)
+    ] = 40
+    design: Annotated[
+        Simulations, told("Points that the emulator's replicates share, each stirred twice.")
+    ] = 512
+    budget: Annotated[Simulations, told("Simulations of each replicate's search.")] = 20
+    noise_deg: Annotated[float, told("Of the cameras [deg].", gt=0.0, lt=90.0)] = 0.1
     particles: Particles = 0
     seed: Seed = 0
 
@@ -179,7 +176,7 @@ class SbcSettings:
         """Their number, by surrogate."""
         return {"signal": self.runs, "discrepancy": self.sequential}
 
-    def calibration(self, surrogate: str) -> CalibrationSettings:
+    def calibration(self, surrogate: Surrogate) -> CalibrationSettings:
         """Settings of one replicate: those of `calibrate`."""
         return CalibrationSettings(
             budget=self.budget, surrogate=surrogate, particles=self.particles
@@ -188,38 +185,23 @@ class SbcSettings:
 
 @checked()
 class PourSettings:
-    """What decides the choice of a pour besides the posterior and the cups.
+    """What decides the choice of a pour besides the posterior and the cups."""
 
-    Attributes:
-        budget: Pours that are simulated at most; a map of landings is learned from them.
-        iterations: Angular velocities that are tried on the map, each with every distance.
-        draws: Posterior draws over which spillage is averaged.
-        risk: "mean", or "cvar": the mean over the worst tenth of the draws.
-        seed: Seed of all random draws.
-    """
-
-    budget: Pours = 64
-    iterations: Simulations = 31
-    draws: Count = 128
-    risk: Annotated[str, one_of(RISKS)] = "mean"
+    budget: Annotated[Pours, told("Pours simulated at most, 24 to 100.")] = 64
+    iterations: Annotated[Simulations, told("Angular velocities tried.")] = 31
+    draws: Annotated[Count, told("Posterior draws that each action is tried on.")] = 128
+    risk: Annotated[Risk, told("Spillage to keep low: the mean, or the worst tenth's.")] = "mean"
     seed: Seed = 0
 
 
 @checked()
 class CriticismSettings:
-    """What decides a criticism besides its data.
+    """What decides a criticism besides its data."""
 
-    Attributes:
-        effects: Names of those that are considered; None is all.
-        accept: Names of those that join the model whatever the verdict.
-        seed: Seed of all random draws.
-        batch: Simulations in one call where there is no executor; a thread takes four.
-    """
-
-    effects: Names | None = None
-    accept: Names | None = None
+    effects: Annotated[Names, told("Effects to consider; all if none is given.")] = None
+    accept: Annotated[Names, told("Effects that join the model whatever the verdict.")] = None
     seed: Seed = 0
-    batch: Count = 32
+    batch: Annotated[Count, told("Simulations in one call, where there is no executor.")] = 32
 
     @property
     def stir_plan(self) -> "Plan":

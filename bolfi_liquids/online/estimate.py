@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.noise import rms, sensor_noise
-from ..calibration.stir_simulator import Stirring
 from ..calibration.summary import BAD_FIT_RATIO, MIN_NOISE_DEG, unexplained
 from ..inputs.frame import frame_faults
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from ..models import stirring_error
 from ..pouring.landing_map import LandingMap
 from ..seeds import Phase, simulation_seeds
+from ..simulators import StirSimulator
 from .plan import Followed
 from .settings import OnlineSettings
 
@@ -104,7 +104,7 @@ class Problem:
     """
 
     prior: "Prior"
-    stirring: Stirring
+    stirring: StirSimulator
     settings: OnlineSettings
 
     @property

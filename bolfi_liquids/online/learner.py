@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..calibration.stir_simulator import stirring_of
+from ..simulators import PourSimulator, stir_simulator
 from .newest_message import newest
 from .plan import SoFar, follow, stroke_ends
 from .request import PARTNER_GONE, OnlinePhase, Request, Status
@@ -49,7 +49,7 @@ class _Learner:
         self.parent, self.simulator, self.request = parent, simulator, request
         self.plan = request.plan()
         self.ends = stroke_ends(self.plan)
-        stirring = stirring_of([self.plan], request.settings.particles)
+        stirring = stir_simulator([self.plan], request.settings.particles)
         self.problem = Problem(read_prior(request.prior), stirring, request.settings)
         self.made = self.problem.nothing
         self.flying: list[list[Job]] = []  # in the order sent
@@ -60,8 +60,8 @@ class _Learner:
     def prepare(self) -> bool:
         """Simulate the design; meanwhile learn the map. Whether all went well."""
         from ..inference import SimulationBank
-        from ..inference.simulations import Keep
-        from ..pouring.landed_pours import LandedPours
+        from ..inference.simulations import Compute
+        from ..pouring.landed_pours import Parcels
         from ..pouring.landing_map import map_of_prior
         from .estimate import design
 
@@ -70,9 +70,11 @@ class _Learner:
         for start in range(0, len(jobs), side_by_side):
             self._send(jobs[start : start + side_by_side])
         self._tell(OnlinePhase.PREPARING, "learning the map of landings")
-        pours = LandedPours(self.request.cups, self.plan.number("liquid_density"))
+        density = self.plan.number("liquid_density")
+        pours = PourSimulator(self.request.cups, density, Parcels())
         with SimulationBank(self.request.bank) as bank:
-            self.landing_map = map_of_prior(self.problem.prior, pours, settings.pours, Keep(bank))
+            compute = Compute(bank=bank)
+            self.landing_map = map_of_prior(self.problem.prior, pours, settings.pours, compute)
         while self.flying:
             self._tell(OnlinePhase.PREPARING, "simulating the plan")
             self._land()

@@ -31,10 +31,11 @@ from ..inputs.prior import (
 )
 from ..inputs.recording import Recording
 from ..pouring.design import joint_prior, whole
-from ..pouring.landed_pours import LandedPours, pours_in
+from ..pouring.landed_pours import Parcels, pours_in
 from ..progress import progress_bar
 from ..run.lock import alone_in
 from ..run.run import RUN_TOML
+from ..simulators import PourSimulator
 from .learner import learn_online
 from .newest_message import Outbox
 from .online_choice import OnlineChoice
@@ -99,7 +100,7 @@ class OnlineCalibration:
             InputError: The plan, the prior or the directory of the run cannot be used.
         """
         from ..inference import SimulationBank
-        from ..inference.simulations import Keep
+        from ..inference.simulations import Compute
 
         settings = choice.settings
         prior = default_prior() if choice.prior is None else choice.prior
@@ -125,9 +126,9 @@ class OnlineCalibration:
                 # to be found there by the process that learns, which shows no bar
                 pours_in(
                     whole(joint_prior(prior, (), cups)),
-                    LandedPours(cups, density),
+                    PourSimulator(cups, density, Parcels()),
                     settings.pours,
-                    Keep(kept),
+                    Compute(bank=kept),
                     advance,
                 )
             request = Request(

@@ -20,6 +20,7 @@ from ..robot.stir import (
     StirPlan,
     plan_stir,
     stir_session,
+    stir_task,
 )
 from .online import OnlineCalibration
 from .online_choice import OnlineChoice
@@ -80,7 +81,8 @@ def record_online(
     rig, hidden = rig_of(rig), hidden_liquid(emulate)
     plan, out = plan_stir(rig, online.cycles), given_path(out, Argument("out"))
     check_new(out)
-    hidden = None if hidden is None else with_stir(rig, plan, hidden)
+    by = ask if hidden is None else with_stir(rig, plan, hidden)
+    assert by is not None
     with OnlineCalibration.start(
         _simulated(plan),
         rig_attributes(rig),
@@ -91,7 +93,7 @@ def record_online(
             raise RuntimeError(f"the calibration is not ready: {calibration.status.detail}")
         with (
             save_on_stop(out),
-            stir_session(rig, plan, out, ask=ask, emulate=hidden) as session,
+            stir_session(stir_task(rig, plan, out), by) as session,
             SessionView("stirring and calibrating", shown=progress) as view,
         ):
             _Stirring(session, plan, calibration, view, online.told).carry_out()

@@ -1,6 +1,6 @@
 """What decides an online calibration besides plan, cups and data."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -14,10 +14,8 @@ from ..inputs.settings import (
     Simulations,
     Surrogate,
     checked,
-    one_of,
 )
 
-STOPS = ("bound", "mean")
 WHERE = "online setting {}"
 
 
@@ -41,7 +39,7 @@ class OnlineSettings:
     """
 
     target: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.05
-    stop: Annotated[str, one_of(STOPS)] = "bound"
+    stop: Literal["bound", "mean"] = "bound"
     least_strokes: Count = 9
     design: Simulations = 16
     budget: int = 48

@@ -4,7 +4,7 @@ import os
 import signal
 from multiprocessing.connection import Connection
 
-from ..calibration.stir_simulator import stirring_of
+from ..simulators import stir_simulator
 from .request import PARTNER_GONE, Request
 
 NICENESS = 10  # of this process; control and cameras come first
@@ -16,15 +16,16 @@ def simulate_plan(link: Connection, request: Request) -> None:
     Ends when the other end of `link` is closed.
     """
     from ..inference import SimulationBank
-    from ..inference.simulations import Keep, run_missing
+    from ..inference.simulations import Compute, run_missing
 
     step_back(NICENESS)
-    stirring = stirring_of([request.plan()], request.settings.particles)
+    stirring = stir_simulator([request.plan()], request.settings.particles)
     with SimulationBank(request.bank) as bank:
+        known = {"compute": Compute(bank=bank), "identity": stirring.identity}
         while True:
             try:
                 jobs = link.recv()
-                link.send(run_missing(stirring.simulate, jobs, Keep(bank, stirring.identity)))
+                link.send(run_missing(stirring.simulate, jobs, **known))
             except PARTNER_GONE:
                 return
 

@@ -3,7 +3,7 @@
 import json
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,21 +17,22 @@ from ..errors import Argument, InputError
 from ..inputs.cups import cups_of
 from ..inputs.pour_table import Pours, PourTable, check_scene, table_of
 from ..inputs.prior import PARAMETERS
-from ..inputs.settings import PourSettings
+from ..inputs.settings import PourSettings, Risk
 from ..progress import progress_bar
-from ..run.compute import Compute, open_compute
+from ..run.compute import open_compute
 from ..run.given_pours import GIVEN_POURS, digest_of_pours, keep_pours, kept_pours
 from ..run.run import Run, RunOrPath
+from ..simulators import PourSimulator
 from .design import acting_in_pours, box_around, joint_prior
 from .draining import LIQUIDS, TENTH, Draining, Hold, hold_of
-from .landed_pours import LandedPours, pours_in
+from .landed_pours import Parcels, pours_in
 from .landing_map import LandingMap, learn_map
 from .pour_file import pour_tree
 from .result import Judged, Pour, PourSummary
 from .spillage import Surface, landing_sd
 
 if TYPE_CHECKING:
-    from ..inference.simulations import Workers
+    from ..inference.simulations import Compute, Workers
     from ..models import Cups
 
 logger = logging.getLogger(__name__)
@@ -51,7 +52,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     budget: int = PourSettings.budget,
     iterations: int = PourSettings.iterations,
     draws: int = PourSettings.draws,
-    risk: str = "mean",
+    risk: Risk = "mean",
     seed: int = 0,
     force: bool = False,
     executor: "Workers | None" = None,
@@ -98,10 +99,10 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         if not force:
             refuse_bad_fit(latest.summary, run.path)
         counted = _counted(run.path, cups, table)
-        with open_compute(executor, timeout, progress=progress) as compute:
+        with open_compute(executor, timeout) as compute:
             if table is not None:
                 keep_pours(run.path, table, cups)
-            pour = decided(latest, cups, settings, compute, counted)
+            pour = decided(latest, cups, settings, compute, counted, progress=progress)
         made_from = {
             "after": latest.key,
             "given": digest_of_pours(run.path),
@@ -124,9 +125,9 @@ def _posterior_of(given: RunOrPath, run: Run) -> Calibration:
         return calibration_to_pour(run)
     if given.key != run.posterior_key():
         raise InputError(
-            "has another posterior since",
+            "holds another posterior: a criticism has added to it, or draws were changed",
             where=str(run.path),
-            fix="open it again, or give the RUN directory",
+            fix="give the RUN directory",
         )
     return given
 
@@ -158,20 +159,23 @@ def decided(
     calibration: Calibration,
     cups: "Cups",
     settings: PourSettings,
-    compute: Compute,
+    compute: "Compute",
     given: PourTable | None = None,
+    *,
+    progress: bool = False,
 ) -> Pour:
     """The pour of a posterior; pours are kept in the run's bank, and nothing else is written.
 
     Args:
         calibration, cups, settings, compute: See `choose_pour`.
         given: Pours of the liquid that were made, all of them within the range of the cups.
+        progress: Whether to show bars on stderr.
 
     Raises:
         InputError, RuntimeError: See `choose_pour`.
     """
     drawn = strata(calibration, settings.draws, settings.seed)
-    simulated = _learned(calibration, cups, settings, compute)
+    simulated = _learned(calibration, cups, settings, compute, progress)
     learned = simulated
     if given is not None:
         learned = simulated.corrected(given, drawn.search, seed=settings.seed)
@@ -180,7 +184,9 @@ def decided(
         learned.judge(action, drawn.judge, seed=settings.seed)
         for action in (choice.chosen, choice.plug_in)
     )
-    more: dict[str, Any] = {"hold": _hold(calibration, chosen, choice, simulated, compute)}
+    more: dict[str, Any] = {
+        "hold": _hold(calibration, chosen, choice, simulated, compute, progress)
+    }
     if learned.given is not None:
         otherwise = simulated.surface(drawn.search, rates=settings.iterations, seed=settings.seed)
         without = learned.judge(otherwise.least(settings.risk), drawn.judge, seed=settings.seed)
@@ -193,33 +199,39 @@ def _hold(
     chosen: Judged,
     choice: "_Choice",
     learned: LandingMap,
-    compute: Compute,
+    compute: "Compute",
+    progress: bool,
 ) -> Hold | None:
     """How the source of the chosen pour empties, where much stays in it."""
     if chosen.fractions[:, 2].mean() <= TENTH:
         return None
-    draining = Draining(learned.cups, calibration.liquid_density, learned.box.effects)
+    density, effects = calibration.liquid_density, learned.box.effects
+    draining = PourSimulator(learned.cups, density, Draining(), effects)
     with (
         calibration.run.bank() as bank,
-        progress_bar("holding the source", LIQUIDS, shown=compute.progress) as advance,
+        progress_bar("holding the source", LIQUIDS, shown=progress) as advance,
     ):
-        rate, keep = chosen.angular_velocity, compute.keep(bank)
-        return hold_of(draining, rate, choice.liquids, keep, advance)
+        rate, own = chosen.angular_velocity, replace(compute, bank=bank)
+        return hold_of(draining, rate, choice.liquids, own, advance)
 
 
 def _learned(
-    calibration: Calibration, cups: "Cups", settings: PourSettings, compute: Compute
+    calibration: Calibration,
+    cups: "Cups",
+    settings: PourSettings,
+    compute: "Compute",
+    progress: bool,
 ) -> LandingMap:
     """The map of landings around a posterior; what the run's bank holds is not poured again."""
     draws = {str(name): v.to_numpy().ravel() for name, v in calibration.posterior.items()}
     effects = acting_in_pours([name for name in draws if name not in PARAMETERS])
     box = box_around(joint_prior(calibration.prior, effects, cups), draws, calibration.best)
-    pours = LandedPours(cups, calibration.liquid_density, effects)
+    pours = PourSimulator(cups, calibration.liquid_density, Parcels(), effects)
     with (
         calibration.run.bank() as bank,
-        progress_bar("pouring", settings.budget, shown=compute.progress) as advance,
+        progress_bar("pouring", settings.budget, shown=progress) as advance,
     ):
-        poured = pours_in(box, pours, settings.budget, compute.keep(bank), advance)
+        poured = pours_in(box, pours, settings.budget, replace(compute, bank=bank), advance)
     return learn_map(box, cups, poured)
 
 

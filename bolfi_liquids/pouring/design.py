@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..inputs.prior import PARAMETERS
 from ..seeds import Phase, generator, simulation_seeds
+from ..simulators import RATE
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from ..inference.simulations import Job
     from ..models import Cups
 
-RATE = "angular_velocity"
 CELLS = 32  # of the lattice, along each side
 TAIL = 0.005  # of a parameter's draws, at either end, that may lie outside
 MARGIN = 0.1  # by which the box is wider at either end, in units of the draws' range

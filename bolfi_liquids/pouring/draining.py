@@ -1,23 +1,19 @@
 """How long the source must be held until nearly all of the liquid has left it."""
 
-import json
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inputs.prior import split_parameters
 from ..progress import Advance, silent
-from ..run.fluid_simulator import FluidSimulator
 from ..run.summary import Number
 from ..seeds import Phase, simulation_seeds
-from .design import RATE
+from ..simulators import RATE, Batched, PourSimulator
 
 if TYPE_CHECKING:
-    from ..inference.simulations import Keep
-    from ..models import Cups
+    from ..inference.simulations import Compute
 
 TENTH = 0.1  # share of the liquid that may stay in the source
 HELD_S = np.arange(0.0, 10.01, 0.1)  # that a pour is simulated for
@@ -43,52 +39,40 @@ class Hold:
 
 
 @dataclass(frozen=True)
-class Draining(FluidSimulator):
-    """Pours whose source is held for as long as `HELD_S` says.
+class Draining:
+    """Shares (B, T) that are left in sources that are held for as long as `HELD_S` says."""
 
-    Attributes:
-        cups: Source and receiver, and how the source is turned.
-        density: Of the liquid [kg/m3].
-        effects: Names of those whose coefficients are parameters.
-    """
-
-    cups: "Cups"
-    density: float
-    effects: tuple[str, ...] = ()
-
-    def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
-        """Shares (B, T) left in the source, at theta, name -> (B,)."""
+    def __call__(
+        self, batch: Batched, theta: Mapping[str, NDArray], seeds: NDArray
+    ) -> NDArray[np.float64]:
         from .. import models
 
-        rest = {name: values for name, values in theta.items() if name != RATE}
-        liquid, effects = split_parameters(rest)
-        given = models.Liquid(**liquid, density=self.density)
-        plan = self.cups.pour.model_copy(update={"hold": float(HELD_S[-1])})
-        cups = self.cups.model_copy(update={"pour": plan})
-        return models.draining(given, theta[RATE], cups, seeds, HELD_S, effects=effects or None)
+        pours = batch(theta, seeds)
+        plan = pours.cups.pour.model_copy(update={"hold": float(HELD_S[-1])})
+        held = pours._replace(cups=pours.cups.model_copy(update={"pour": plan}))
+        return models.draining(held, HELD_S)
 
     @property
-    def identity(self) -> str:
-        """A text that two equal simulators share."""
-        made_of = [self.cups.settings(), self.density, list(self.effects), HELD_S.tolist()]
-        return json.dumps(["draining", *made_of], sort_keys=True)
+    def settings(self) -> list[Any]:
+        """The times."""
+        return ["draining", HELD_S.tolist()]
 
 
 def hold_of(
-    draining: Draining,
+    draining: PourSimulator,
     rate: float,
     liquids: Mapping[str, NDArray],
-    keep: "Keep",
+    compute: "Compute",
     advance: Advance = silent,
 ) -> Hold:
     """How a source that is turned at a rate [rad/s] empties.
 
     Args:
-        draining: The simulator.
+        draining: The simulator of `Draining`.
         rate: At which the source turns.
         liquids: Posterior draws, name -> (draws,); a few of them are poured, thin to thick.
-        keep: Where pours are made and kept; its identity and batch are not used, and its timeout
-            is that of a pour that is held as the cups say.
+        compute: Where pours are made and kept; its batch is not used, and its timeout is that of a
+            pour that is held as the cups say.
         advance: Called with 1 for each of these pours.
 
     Raises:
@@ -103,9 +87,9 @@ def hold_of(
     seeds = simulation_seeds(0, Phase.DRAINING, LIQUIDS)
     plan = draining.cups.pour
     longer = (plan.final_angle / rate + HELD_S[-1]) / (plan.final_angle / rate + plan.hold)
-    timeout = None if keep.timeout is None else longer * keep.timeout
-    keep = keep._replace(identity=draining.identity, batch=LIQUIDS, timeout=timeout)
-    made = simulate_kept(draining.simulate, theta, seeds, keep, advance=advance)
+    timeout = None if compute.timeout is None else longer * compute.timeout
+    compute = replace(compute, batch=LIQUIDS, timeout=timeout)
+    made = simulate_kept(draining, theta, seeds, compute, advance=advance)
     left = made.signals.mean(axis=0)
     return Hold(_until_tenth(left), float(HELD_S[-1]), float(left[-1]))
 

@@ -1,24 +1,21 @@
 """The pours of a map: made where the bank lacks them, and kept under what they depend on."""
 
-import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inputs.prior import split_parameters
 from ..progress import Advance, silent
-from ..run.fluid_simulator import FluidSimulator
-from .design import RATE, Box
+from ..simulators import Batched, PourSimulator
+from .design import Box
 from .parcels import PARCELS, parcels_of
 
 if TYPE_CHECKING:
     from ..inference import SimulationBank
-    from ..inference.simulations import Keep
-    from ..models import Cups
+    from ..inference.simulations import Compute
 
 AT_ONCE = 8  # pours in one call: four march together on each of two processors
 
@@ -36,39 +33,24 @@ class Poured(NamedTuple):
 
 
 @dataclass(frozen=True)
-class LandedPours(FluidSimulator):
-    """A simulator of pours whose effects may have any coefficient.
+class Parcels:
+    """Where the liquid lands, as rows (B, ROW) of `parcels`."""
 
-    Attributes:
-        cups: Source and receiver, and how the source is turned.
-        density: Of the liquid [kg/m3].
-        effects: Names of those whose coefficients are parameters.
-    """
-
-    cups: "Cups"
-    density: float
-    effects: tuple[str, ...] = ()
-
-    def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
-        """Rows (B, ROW) of pours at theta, name -> (B,)."""
+    def __call__(
+        self, batch: Batched, theta: Mapping[str, NDArray], seeds: NDArray
+    ) -> NDArray[np.float64]:
         from .. import models
 
-        rest = {name: values for name, values in theta.items() if name != RATE}
-        liquid, effects = split_parameters(rest)
-        given = models.Liquid(**liquid, density=self.density)
-        return parcels_of(
-            models.landings(given, theta[RATE], self.cups, seeds, effects=effects or None)
-        )
+        return parcels_of(models.landings(*batch(theta, seeds)))
 
     @property
-    def identity(self) -> str:
-        """A text that two equal simulators share."""
-        made_of = [self.cups.settings(), self.density, list(self.effects), PARCELS]
-        return json.dumps(["landed pours", *made_of], sort_keys=True)
+    def settings(self) -> list[Any]:
+        """The number of parcels."""
+        return ["landed pours", PARCELS]
 
 
 def pours_in(
-    box: Box, pours: LandedPours, count: int, keep: "Keep", advance: Advance = silent
+    box: Box, pours: PourSimulator, count: int, compute: "Compute", advance: Advance = silent
 ) -> Poured:
     """All pours in a box that the bank holds, once it holds the first `count` of the sequence.
 
@@ -76,34 +58,37 @@ def pours_in(
 
     Args:
         box: Where they are wanted.
-        pours: The simulator, with the effects of the box.
+        pours: The simulator of `Parcels`, with the effects of the box.
         count: How many of the sequence; never are more than these made.
-        keep: Where pours are made and kept; its identity and batch are not used.
+        compute: Where pours are made and kept; its batch is not used.
         advance: Called with 1 for each pour of the sequence.
 
     Raises:
+        ValueError: There is no bank.
         RuntimeError: All of the sequence failed.
     """
     from ..run.simulations import simulate_kept
 
     asked = box.jobs(count)
     theta = {name: np.array([job.theta[name] for job in asked]) for name in box.prior.names}
-    keep = keep._replace(identity=pours.identity, batch=AT_ONCE)
-    simulate_kept(pours.simulate, theta, [job.seed for job in asked], keep, advance=advance)
-    found = [one for one in _in_bank(box, pours, keep.bank)]
+    if (bank := compute.bank) is None:
+        raise ValueError("compute needs a bank: the map learns from all pours that it holds")
+    compute = replace(compute, batch=AT_ONCE)
+    simulate_kept(pours, theta, [job.seed for job in asked], compute, advance=advance)
+    found = [one for one in _in_bank(box, pours, bank)]
     return Poured(
         {name: np.concatenate([one.theta[name] for one in found]) for name in box.prior.names},
         np.concatenate([one.rows for one in found]),
     )
 
 
-def _in_bank(box: Box, pours: LandedPours, bank: "SimulationBank") -> Iterator[Poured]:
+def _in_bank(box: Box, pours: PourSimulator, bank: "SimulationBank") -> Iterator[Poured]:
     """What the bank holds inside of the box, by the effects with which it was poured."""
     from ..models import EFFECTS
 
     for size in range(len(pours.effects) + 1):
         for effects in combinations(pours.effects, size):
-            identity = LandedPours(pours.cups, pours.density, effects).identity
+            identity = replace(pours, effects=effects).identity
             if not bank.holds(identity):
                 continue
             made = bank.simulations(identity)

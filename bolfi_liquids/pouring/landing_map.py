@@ -18,9 +18,10 @@ from ..inputs.pour_table import PourTable
 from ..inputs.settings import MIN_MAP_POURS
 from ..progress import Advance, silent
 from ..seeds import Phase, generator
-from .design import RATE, Box, joint_prior, whole
+from ..simulators import RATE, PourSimulator
+from .design import Box, joint_prior, whole
 from .given import GivenPours, learn_given
-from .landed_pours import LandedPours, Poured, pours_in
+from .landed_pours import Poured, pours_in
 from .parcels import fractions_of, scale
 from .result import Judged
 from .spillage import (
@@ -36,7 +37,7 @@ from .spillage import (
 
 if TYPE_CHECKING:
     from ..inference import Emulation, Prior
-    from ..inference.simulations import Keep
+    from ..inference.simulations import Compute
     from ..models import Cups
 
 RATES = 31  # angular velocities that are tried
@@ -225,9 +226,9 @@ def number_of(liquids: Mapping[str, NDArray]) -> int:
 
 def map_of_prior(
     prior: "Prior",
-    pours: LandedPours,
+    pours: PourSimulator,
     count: int,
-    keep: "Keep",
+    compute: "Compute",
     advance: Advance = silent,
 ) -> LandingMap:
     """Of every liquid of a prior.
@@ -236,10 +237,10 @@ def map_of_prior(
         prior: Of viscosity and cohesion.
         pours: The simulator.
         count: Pours of the sequence, see `pours_in`, which explains the rest.
-        keep, advance: See there.
+        compute, advance: See there.
     """
     box = whole(joint_prior(prior, pours.effects, pours.cups))
-    return learn_map(box, pours.cups, pours_in(box, pours, count, keep, advance))
+    return learn_map(box, pours.cups, pours_in(box, pours, count, compute, advance))
 
 
 def learn_map(box: Box, cups: "Cups", poured: Poured) -> LandingMap:

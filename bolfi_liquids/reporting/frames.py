@@ -19,7 +19,6 @@ from ..inputs.cups import kept_cups
 from ..inputs.prior import split_parameters
 from ..inputs.recording import Recording
 from ..progress import Advance, progress_bar
-from ..run.compute import HERE, Compute
 from ..run.result_file import read_result, write_result
 from ..run.run import FRAMES, as_json
 from ..seeds import Phase, simulation_seeds
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
     from ..calibration.result import Calibration
+    from ..inference.simulations import Compute
     from ..models import StirFrames
     from ..pouring.result import Pour
 
@@ -61,12 +61,13 @@ class Shown(NamedTuple):
         return {**self.pour.chosen.action, "cups": json.loads(self.pour.tree.attrs["cups"])}
 
 
-def frames_of(shown: Shown, compute: Compute = HERE) -> "Dataset":
+def frames_of(shown: Shown, compute: "Compute", *, progress: bool = True) -> "Dataset":
     """The run's frames; simulated if there are none of this calibration and pour.
 
     Args:
         shown: What they are of.
         compute: Where draws are simulated.
+        progress: Whether to show a bar on stderr.
 
     Raises:
         RuntimeError: A simulation took longer than the timeout; nothing was written.
@@ -85,7 +86,7 @@ def frames_of(shown: Shown, compute: Compute = HERE) -> "Dataset":
     from xarray import DataTree
 
     try:
-        frames = _simulated(scenes, _draws(theta, seeds), compute)
+        frames = _simulated(scenes, _draws(theta, seeds), compute.executor, progress)
     except TimeoutError as err:
         if compute.timeout is None:
             raise
@@ -109,10 +110,10 @@ def _scenes(
     pour: Mapping[str, Any] | None,
     timeout: float | None,
 ) -> _Scenes:
-    from ..calibration.stir_simulator import stirring_of
+    from ..simulators import stir_simulator
 
     particles = int(calibration.record["settings"]["particles"])
-    stir = StirScene(stirring_of([recording], particles), timeout)
+    stir = StirScene(stir_simulator([recording], particles), timeout)
     if pour is None:
         return _Scenes(stir, None)
     action = float(pour["angular_velocity"]), float(pour["distance"])
@@ -120,11 +121,12 @@ def _scenes(
     return _Scenes(stir, PourScene(cups, *action, density, timeout))
 
 
-def _simulated(scenes: _Scenes, draws: list[Draw], compute: Compute) -> dict[str, Any]:
+def _simulated(
+    scenes: _Scenes, draws: list[Draw], workers: Executor | None, progress: bool
+) -> dict[str, Any]:
     """All of the file's variables but theta."""
     steps = len(draws) * sum(scene is not None for scene in scenes)
-    workers = compute.executor
-    with progress_bar("moving pictures", steps, shown=compute.progress) as advance:
+    with progress_bar("moving pictures", steps, shown=progress) as advance:
         stirs = _each(scenes.stir, draws, workers, advance)
         pours = None if scenes.pour is None else _each(scenes.pour, draws, workers, advance)
         frames = _stirred(list(stirs), scenes.stir.stirring.time)

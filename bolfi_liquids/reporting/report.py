@@ -17,7 +17,7 @@ from ..files import write_text
 from ..hover_labels import script_json
 from ..inputs.prior import Described
 from ..pouring.result import Pour
-from ..run.compute import Compute, open_compute
+from ..run.compute import open_compute
 from ..run.run import REPORT, Run, RunOrPath
 from ..wording import LIQUID_UNITS, sentence
 from . import sentences
@@ -25,7 +25,7 @@ from .criticism_chapter import criticism_context
 from .warnings import Results, warnings_of
 
 if TYPE_CHECKING:
-    from ..inference.simulations import Workers
+    from ..inference.simulations import Compute, Workers
 
 PAGE_TEMPLATE = "report.html.jinja"
 
@@ -53,16 +53,17 @@ def report(
     """
     with (
         Run.entered(run) as opened,
-        open_compute(executor, timeout, progress=progress) as compute,
+        open_compute(executor, timeout) as compute,
     ):
-        return written(Results.of(opened), compute, moving=moving)
+        return written(Results.of(opened), compute, moving=moving, progress=progress)
 
 
 def written(
     results: Results,
-    compute: Compute,
+    compute: "Compute",
     *,
     moving: bool = True,
+    progress: bool = True,
     chapters: Mapping[str, Any] = MappingProxyType({}),
 ) -> Path:
     """Write RUN/report.html from given results.
@@ -70,11 +71,11 @@ def written(
     Args:
         results: What the run holds.
         compute: Where moving pictures are simulated.
-        moving: See `report`.
+        moving, progress: See `report`.
         chapters: What is drawn already, by the names of `CHAPTERS`.
     """
     calibration = results.calibration
-    pictures = _moving(results, compute) if moving else None
+    pictures = _moving(results, compute, progress) if moving else None
     given = {name: getattr(results, name) for name in CHAPTERS}
     drawn = {
         name: chapters.get(name) or (one and CHAPTERS[name](one)) for name, one in given.items()
@@ -183,14 +184,14 @@ CHAPTERS: dict[str, Callable[[Any], dict[str, Any]]] = {
 """What the template needs of each result."""
 
 
-def _moving(results: Results, compute: Compute) -> dict[str, Any] | None:
+def _moving(results: Results, compute: "Compute", progress: bool) -> dict[str, Any] | None:
     """Moving pictures of the latest posterior and the pour."""
     from .frames import Shown, frames_of
     from .moving_pictures import moving_context
 
     latest = results.latest
     shown = Shown(latest, latest.run.recordings[0], results.pour)
-    return moving_context(shown, frames_of(shown, compute))
+    return moving_context(shown, frames_of(shown, compute, progress=progress))
 
 
 def _text(name: str) -> str:

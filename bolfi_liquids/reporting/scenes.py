@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from ..calibration.stir_simulator import Stirring
     from ..models import Cups, PourFrames, StirFrames
+    from ..simulators import StirSimulator
 
 FRAME_RATE = 15.0
 """Of the pictures [1/s]."""
@@ -34,7 +34,7 @@ class StirScene(NamedTuple):
         timeout: Seconds that one simulation may take; None sets no limit.
     """
 
-    stirring: "Stirring"
+    stirring: "StirSimulator"
     timeout: float | None
 
     def __call__(self, draw: Draw) -> "StirFrames":

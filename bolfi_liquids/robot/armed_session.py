@@ -1,14 +1,15 @@
 """A session that may move an arm: a person has agreed, or the arm is emulated."""
 
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from ..hardware import EmulatedRig, HiddenLiquid, Rig, Session, Tool
+    from ..hardware import Check, EmulatedRig, HiddenLiquid, Rig, Session, Tool
     from ..hardware.motion import PosePath
 
 Ask = Callable[[str], str]
@@ -34,16 +35,22 @@ class Task(NamedTuple):
     cameras: bool = False
     about: str = ""
 
+    def describe(self) -> str:
+        """The plan as a person reads it."""
+        from ..hardware.session.confirmation import describe
+
+        return f"{self.about}\n{describe(self.paths, self.rig, self.tool)}".lstrip()
+
 
 class EmulatedRobot(NamedTuple):
     """What to use in place of a robot.
 
     Attributes:
-        start: Runs the emulator while it is entered.
+        rig: The arm and its cameras.
         source: Where the data come from, for the recording.
     """
 
-    start: "AbstractContextManager[EmulatedRig]"
+    rig: "EmulatedRig"
     source: str
 
 
@@ -60,7 +67,7 @@ def hidden_liquid(emulate: "HiddenLiquid | bool") -> "HiddenLiquid | None":
 
 
 def check_consent(ask: Ask | None, emulate: object, where: str) -> None:
-    """Refuse a motion that nobody is asked about, or that is both real and emulated.
+    """Require either a confirmation or the emulator, not both.
 
     Raises:
         InputError: `ask` and `emulate` are both given, or neither is.
@@ -74,55 +81,59 @@ def check_consent(ask: Ask | None, emulate: object, where: str) -> None:
 
 
 @contextmanager
-def armed_session(
-    task: Task, *, ask: Ask | None = None, emulation: EmulatedRobot | None = None
-) -> "Iterator[Session]":
-    """Ask a person, or start an emulator; then a session that may move the arm.
+def armed_session(task: Task, by: Ask | EmulatedRobot) -> "Iterator[Session]":
+    """Ask a person, unless the arm is emulated; then a session that may move the arm.
 
     Args:
         task: What will be done.
-        ask: Shows the plan; what it returns must be the sentence that the plan asks for.
-        emulation: Used instead; nobody is asked.
+        by: Shows the plan, and returns the sentence that the plan asks for; or an emulator, which
+            nobody is asked about.
 
     Raises:
-        InputError: Both are given, or neither.
         RigError: The person did not agree, or something cannot be used.
     """
-    from ..hardware import Session, SessionSetup, confirm, confirm_emulated, webcams
-    from ..hardware.session.confirmation import describe
+    from ..hardware import Session, SessionSetup, confirm, webcams
 
-    check_consent(ask, emulation, "armed_session")
-    text = f"{task.about}\n{describe(task.paths, task.rig, task.tool)}".lstrip()
-    with ExitStack() as stack:
-        if emulation is not None:
-            running = stack.enter_context(emulation.start)
-            address, source = running.emulator.address, emulation.source
-            make_cameras = running.make_cameras
-            confirmation = confirm_emulated(text, address)
-        else:
-            assert ask is not None
-            address, source = task.rig.robot.host, "robot"
-            make_cameras = webcams(task.rig)
-            confirmation = confirm(text, ask(text), address)
-        setup = SessionSetup(
-            task.rig,
-            task.out,
-            address,
-            make_cameras if task.cameras else {},
-            tool=task.tool,
-            armed=True,
-            confirmation=confirmation,
-            plan=task.paths,
-            rehearsal=emulation is not None,
-            source=source,
-        )
-        yield stack.enter_context(_discarded_unless_moved(Session(setup)))
-
-
-@contextmanager
-def _discarded_unless_moved(session: "Session") -> "Iterator[Session]":
-    """The session entered; what a device that failed before any motion has left is removed."""
-    with ExitStack() as stack:
+    if isinstance(by, EmulatedRobot):
+        arm, make_cameras = by.rig
+        confirmation, source = None, by.source
+    else:
+        arm, make_cameras, source = None, webcams(task.rig), "robot"
+        text = task.describe()
+        confirmation = confirm(text, by(text), task.rig.robot.host)
+    setup = SessionSetup(
+        task.rig,
+        task.out,
+        arm,
+        make_cameras if task.cameras else {},
+        tool=task.tool,
+        armed=True,
+        confirmation=confirmation,
+        plan=task.paths,
+        source=source,
+    )
+    session = Session(setup)
+    with ExitStack() as closed:
         with session:  # which refuses a directory that holds something
-            stack.callback(session.discard_unless_moved)
+            closed.callback(session.discard_unless_moved)
             yield session
+
+
+def dry_run(task: Task) -> "tuple[str, list[Check]]":
+    """The plan, and the pre-flight list of a session that cannot move the arm.
+
+    What it records goes to a temporary directory, on the disk that `task.out` would be on.
+
+    Raises:
+        RigError: The directory cannot be used.
+    """
+    from ..hardware import Session, SessionSetup, webcams
+
+    near = next(one for one in (task.out, *task.out.absolute().parents) if one.is_dir())
+    cameras = webcams(task.rig) if task.cameras else {}
+    with tempfile.TemporaryDirectory(dir=near) as directory:
+        setup = SessionSetup(
+            task.rig, Path(directory), make_cameras=cameras, tool=task.tool, plan=task.paths
+        )
+        with Session(setup) as session:
+            return task.describe(), session.preflight()

@@ -1,8 +1,9 @@
-"""Calibration of one of a rig's cameras, from files or with the camera itself."""
+"""Calibration of one of a rig's cameras: its lens by a printed board, its roll by a plumb line."""
 
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, get_args
 
 import numpy as np
 
@@ -11,10 +12,21 @@ from ..inputs.rigs import rig_of
 
 if TYPE_CHECKING:
     from ..hardware import Camera
-    from ..hardware.session.camera_calibration import CalibratedCamera
+    from ..hardware.vision import CameraModel, CharucoBoard, Intrinsics
 
-VIEWS = ("xz", "yz")
 BOARD_PICTURES = 15
+
+
+class Pictures(NamedTuple):
+    """Pictures from which a camera is calibrated, grey levels.
+
+    Attributes:
+        boards: Of the board; empty to keep the lens.
+        plumb_line: Of a thread that hangs; None to keep the roll.
+    """
+
+    boards: list[np.ndarray]
+    plumb_line: np.ndarray | None
 
 
 def write_board(path: Path) -> Path:
@@ -34,73 +46,124 @@ def write_board(path: Path) -> Path:
     return path
 
 
-class Pictures(NamedTuple):
-    """Pictures from which a camera is calibrated.
-
-    Attributes:
-        square: Side of a printed square [m].
-        boards: Directory of pictures of the board; None takes them with the camera.
-        plumb: Picture of a plumb line; None takes it with the camera, unless `boards` is given.
-    """
-
-    square: float
-    boards: Path | None = None
-    plumb: Path | None = None
-
-
 def calibrate_view(
-    rig: Path | None, view: str, pictures: Pictures, *, out: Path | None = None
+    rig: Path | None,
+    view: str,
+    *,
+    square: float,
+    boards: Path | None = None,
+    plumb_line: Path | None = None,
+    out: Path | None = None,
 ) -> Iterator[str]:
     """Calibrate a camera and write its lens; yields what to tell.
 
     Args:
         rig: Its file; None is the bundled one.
         view: "xz" or "yz".
-        pictures: Of the board and of a plumb line.
+        square: Side of a printed square [m].
+        boards: Directory of pictures of the board.
+        plumb_line: Picture of a plumb line. With neither, the camera takes both.
         out: File of the lens; None is beside the rig's file.
 
     Raises:
         InputError: `view` or `square` cannot be used.
         RigError: The rig, the camera or the pictures cannot be used.
     """
-    from ..hardware.session.camera_calibration import (
-        calibrate_camera,
-        pictures_in,
-        take_pictures,
-        write_lens,
-    )
-    from ..hardware.vision import CharucoBoard
+    from ..hardware import RigError
+    from ..hardware.rig import View
+    from ..hardware.vision import CalibrationError, CharucoBoard, PlumbLineError
 
-    if view not in VIEWS:
+    if view not in get_args(View):
         raise InputError(f"{view!r}", where=Argument("view"), fix="give xz or yz")
-    square, boards, plumb = pictures
     if not 0.002 <= square <= 0.2:
         raise InputError(
             f"{100 * square:g} cm",
             where=Argument("square"),
             fix="give the side of a printed square in cm",
         )
-    camera = rig_of(rig).camera("xz" if view == "xz" else "yz")
-    board = CharucoBoard(
-        square=square, marker=square * CharucoBoard().marker / CharucoBoard().square
-    )
-    live = boards is None and plumb is None
-    on_board = pictures_in(boards) if boards is not None else []
-    hanging = pictures_in(plumb)[0] if plumb is not None else None
-    if live:
-        on_board = take_pictures(camera, BOARD_PICTURES, _ask_for_board)
-        (hanging,) = take_pictures(camera, 1, _ask_for_plumb_line)
-    calibrated = calibrate_camera(camera, on_board, board, hanging)
-    if calibrated.intrinsics is not None:
-        beside = Path(rig).parent if rig is not None else Path()
-        path = write_lens(calibrated, beside / f"camera_{view}.json" if out is None else out)
-        yield from _about_lens(calibrated, path)
-    yield from _about_roll(camera, calibrated)
+    camera = rig_of(rig).camera(view)  # type: ignore[arg-type]
+    usual = CharucoBoard()
+    board = CharucoBoard(square=square, marker=square * usual.marker / usual.square)
+    pictures = _pictures(camera, boards, plumb_line)
+    try:
+        lens, model = _lens(camera, pictures, board)
+        if lens is not None:
+            beside = Path(rig).parent if rig is not None else Path()
+            yield from _written(lens, beside / f"camera_{view}.json" if out is None else out)
+        yield _roll(camera, model, pictures.plumb_line)
+    except (CalibrationError, PlumbLineError) as err:
+        raise RigError(str(err), where=f"camera {view}", fix="take the pictures again") from err
 
 
-def _about_lens(calibrated: "CalibratedCamera", path: Path) -> Iterator[str]:
-    lens = calibrated.intrinsics
-    assert lens is not None
+def _pictures(camera: "Camera", boards: Path | None, plumb_line: Path | None) -> Pictures:
+    """From files, or taken by the camera.
+
+    Raises:
+        RigError: The camera or a file cannot be used.
+    """
+    from ..hardware import RigError
+    from ..hardware.cameras import CameraError
+
+    if boards is None and plumb_line is None:
+        try:
+            return _taken(camera)
+        except CameraError as err:
+            where = f"camera {camera.view}: source = {camera.source!r}"
+            raise RigError(str(err), where=where, fix="correct rig.toml") from err
+    on_board = [] if boards is None else _read(boards)
+    return Pictures(on_board, None if plumb_line is None else _read(plumb_line)[0])
+
+
+def _read(path: Path) -> list[np.ndarray]:
+    """All pictures of a directory, of a video, or the one of a file."""
+    from ..hardware import RigError
+    from ..hardware.cameras import CameraError, FilesCamera
+
+    try:
+        return [frame.image for frame in iter(FilesCamera(path).read, None)]
+    except CameraError as err:
+        raise RigError(str(err), where=str(path), fix="give a directory of pictures") from err
+
+
+def _taken(camera: "Camera") -> Pictures:
+    """Pictures of the board and of the plumb line, each once a person is ready."""
+    from ..hardware.cameras import CameraError
+    from ..hardware.session.cameras import RigCamera
+
+    with closing(RigCamera(camera)()) as source:
+
+        def after(question: str) -> np.ndarray:
+            input(question)
+            source.read()  # what the driver has kept from before
+            if (frame := source.read()) is None:
+                raise CameraError("the camera gives no more pictures")
+            return frame.image
+
+        how = "hold it still, tilted, then press Enter "
+        numbers = range(1, BOARD_PICTURES + 1)
+        on_board = [after(f"board, picture {n} of {BOARD_PICTURES}: {how}") for n in numbers]
+        hang = "plumb line: hang a thread in front of an even background, then press Enter "
+        return Pictures(on_board, after(hang))
+
+
+def _lens(
+    camera: "Camera", pictures: Pictures, board: "CharucoBoard"
+) -> "tuple[Intrinsics | None, CameraModel]":
+    """The lens that the board shows, if it does, and the camera with it at the rig's place."""
+    from ..hardware.recorder.views import camera_model, orientation
+    from ..hardware.vision import calibrate_intrinsics
+
+    if not pictures.boards:
+        return None, camera_model(camera)
+    lens = calibrate_intrinsics(pictures.boards, board)
+    return lens, lens.placed(orientation(camera), np.array(camera.position))
+
+
+def _written(lens: "Intrinsics", path: Path) -> Iterator[str]:
+    """Write the lens; place and roll stay in rig.toml itself."""
+    from ..hardware.vision import write_camera
+
+    write_camera(lens.placed(np.eye(3), np.zeros(3)), path)
     yield (
         f"lens: focal length {lens.focal[0]:.1f} x {lens.focal[1]:.1f} px "
         f"(+- {max(lens.focal_error):.1f}), corners {lens.rms:.2f} px off, {lens.views} pictures"
@@ -110,19 +173,14 @@ def _about_lens(calibrated: "CalibratedCamera", path: Path) -> Iterator[str]:
     yield f'wrote {path}: set intrinsics = "{path.name}" for this camera in rig.toml'
 
 
-def _about_roll(camera: "Camera", calibrated: "CalibratedCamera") -> Iterator[str]:
-    if not np.isfinite(calibrated.roll_error):
-        yield f"roll: kept at {camera.roll_deg:g} deg (no plumb line was given)"
-        return
-    yield (
-        f"roll: {np.degrees(calibrated.roll):.2f} +- {np.degrees(calibrated.roll_error):.2f} deg: "
-        f"set roll_deg = {np.degrees(calibrated.roll):.2f} for this camera in rig.toml"
+def _roll(camera: "Camera", model: "CameraModel", plumb_line: np.ndarray | None) -> str:
+    from ..hardware.vision import level_camera
+
+    if plumb_line is None:
+        return f"roll: kept at {camera.roll_deg:g} deg (no plumb line was given)"
+    levelled = level_camera(plumb_line, model)
+    roll = camera.roll_deg + np.degrees(levelled.roll)
+    return (
+        f"roll: {roll:.2f} +- {np.degrees(levelled.error):.2f} deg: "
+        f"set roll_deg = {roll:.2f} for this camera in rig.toml"
     )
-
-
-def _ask_for_board(number: int) -> None:
-    input(f"board, picture {number} of {BOARD_PICTURES}: hold it still, tilted, then press Enter ")
-
-
-def _ask_for_plumb_line(_: int) -> None:
-    input("plumb line: hang a thread in front of an even background, then press Enter ")

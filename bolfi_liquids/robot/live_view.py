@@ -68,24 +68,16 @@ class SessionView:
             self._warned.add(notice)
             logger.warning(notice)
 
-    def _progress(self, done: int) -> str:
-        if self.motions is None:
-            return ""
-        return f", motion {min(done + 1, self.motions)} of {self.motions}"
-
     def show(self, session: "Session") -> None:
         """Draw the session as it is now."""
         if self._live is None:
             return
         from ..hardware.board import host_time
-        from ..hardware.session.live import LiveStatus, live_table
+        from ..hardware.session.live import live_table
 
         status = session.status()
-        shown = LiveStatus(
-            title=self.title + self._progress(len(status.done)),
-            now=host_time(),
-            rows=tuple(status.rows.values()),
-            guards=status.readings,
-            message="" if status.stopped is None else status.stopped.reason,
-        )
-        self._live.update(Group(live_table(shown), self._note), refresh=True)
+        title = self.title
+        if self.motions is not None:
+            title += f", motion {min(len(status.done) + 1, self.motions)} of {self.motions}"
+        shown = live_table(title, status, host_time())
+        self._live.update(Group(shown, self._note), refresh=True)

@@ -1,23 +1,24 @@
-"""The chosen pour carried out: by the robot, or by the emulator."""
+"""The chosen pour: checked, planned, and carried out by the robot, or by an emulated arm."""
 
+import json
 import logging
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..calibration.bad_fit import bad_fit
+from ..calibration.summary import FitStatus
 from ..errors import InputError
+from ..inputs.cups import kept_cups
 from ..inputs.rigs import rig_of
-from ..pouring.result import Pour
-from ..run.run import Run, RunOrPath
-from .armed_session import (
-    Ask,
-    EmulatedRobot,
-    Task,
-    armed_session,
-    check_consent,
-)
-from .chosen_pour import BAD_FIT, ChosenPour, chosen_pour
+from ..models import Cups
+from ..pouring.result import Judged, Pour
+from ..reporting.warnings import Results, warnings_of
+from ..run.run import RESULTS, Run, RunOrPath
+from ..wording import Sentence, at_most, spilled
+from .armed_session import Ask, EmulatedRobot, Task, armed_session, check_consent, dry_run
 from .live_view import SessionView
 
 if TYPE_CHECKING:
@@ -27,6 +28,96 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 POURS_FOLDER = "pours"  # directories of what the arm did, in the RUN
+ROUNDING = 1e-9  # relative, of an action that was written and read again
+BAD_FIT = "it was chosen over a bad fit: an arm carries it out with --despite-bad-fit only"
+
+
+@dataclass(frozen=True)
+class ChosenPour:
+    """What is to be carried out, and what a person should know before it is.
+
+    Attributes:
+        run: The run that has chosen it.
+        judged: The action and what it spills.
+        cups: For which it was chosen.
+        fit_is_bad: Whether the fit was, or is, so bad that the pour could only be chosen by force.
+        warnings: The report's.
+    """
+
+    run: Run
+    judged: Judged
+    cups: Cups
+    fit_is_bad: bool
+    warnings: tuple[Sentence, ...]
+
+    def check_fit(self, *, despite_bad_fit: bool) -> None:
+        """Refuse a pour that was chosen over a posterior whose fit is bad.
+
+        Args:
+            despite_bad_fit: Whether a person has allowed it nevertheless.
+
+        Raises:
+            InputError: It is one, and nobody has.
+        """
+        if self.fit_is_bad and not despite_bad_fit:
+            raise InputError(
+                "its pour was chosen over a bad fit, and an arm refuses it",
+                where=str(self.run.path),
+                fix="correct the recording, calibrate and choose again, or pour nevertheless: "
+                "--despite-bad-fit (despite_bad_fit=True)",
+            )
+
+    def __str__(self) -> str:
+        """As a person reads it before the motion, what is wrong first."""
+        return "\n".join([*([BAD_FIT] if self.fit_is_bad else []), self.expected])
+
+    @property
+    def expected(self) -> str:
+        """The action, what it spills, and the report's warnings."""
+        chosen = self.judged
+        return "\n".join(
+            [
+                f"the pour that {self.run.path} has chosen: "
+                f"{np.degrees(chosen.angular_velocity):.1f} deg/s, the lip "
+                f"{100 * chosen.distance:.2f} cm from the receiver's axis",
+                f"expected to spill {spilled(chosen.expected_spillage)}, "
+                f"{at_most(chosen.spillage_q95)} in 95 % of outcomes",
+                *(f"warning: {one}" for one in self.warnings),
+            ]
+        )
+
+
+def chosen_pour(run: Run) -> ChosenPour:
+    """The pour of a run, from pour.nc.
+
+    Raises:
+        InputError: The run has chosen none over its latest posterior and given pours, or one that
+            lies outside of what its cups allow.
+    """
+    pour = Pour.made(run, run.required("pour"))
+    results = Results.of(run)
+    chosen, cups = pour.chosen, kept_cups(json.loads(pour.tree.attrs["cups"]))
+    _check_ranges(run, chosen, cups)
+    was_bad = pour.summary.fit_status is FitStatus.BAD
+    is_bad = was_bad or bad_fit(results.latest.summary) is not None
+    return ChosenPour(run, chosen, cups, is_bad, tuple(warnings_of(results)))
+
+
+def _check_ranges(run: Run, chosen: Judged, cups: "Cups") -> None:
+    """Refuse an action that was never to be chosen."""
+    checked = (
+        ("angular_velocity", cups.angular_velocity_range, "rad/s"),
+        ("distance", cups.distance_range, "m"),
+    )
+    for name, (low, high), unit in checked:
+        value, slack = getattr(chosen, name), ROUNDING * max(abs(low), abs(high))
+        if not low - slack <= value <= high + slack:
+            raise InputError(
+                f"{name} {value:g} {unit} is outside of {low:g} to {high:g} {unit}, which the "
+                "cups allow",
+                where=str(run.path / RESULTS["pour"]),
+                fix=run.again("pour"),
+            )
 
 
 class PourMotion(NamedTuple):
@@ -47,6 +138,11 @@ class PourMotion(NamedTuple):
         """`distance` of the lip from the receiver's axis and `lip_height` above its floor [m]."""
         lip_height = self.chosen.cups.pour.lip_height
         return {"distance": self.chosen.judged.distance, "lip_height": lip_height}
+
+    def task(self, rig: "Rig") -> Task:
+        """The motion for a session, recorded in a new directory of the run."""
+        out = _next_directory(self.chosen.run.path)
+        return Task(rig, "pouring", [self.path], out, about=str(self.chosen))
 
 
 def plan_pour(run: Run, rig: "Rig") -> PourMotion:
@@ -77,14 +173,11 @@ def plan_pour(run: Run, rig: "Rig") -> PourMotion:
 
 def _check_receiver(chosen: ChosenPour, rig: "Rig") -> None:
     """Only the cups of the pour say how wide its receiver is."""
-    from ..hardware.rig import check_receiver
+    from ..hardware.rig_checks import receiver_fault
 
-    try:
-        check_receiver(rig, chosen.cups.receiver.radius)
-    except ValueError as err:
-        raise InputError(
-            str(err), where="pouring.receiver", fix="move the receiver away, and correct the rig"
-        ) from err
+    if fault := receiver_fault(rig, chosen.cups.receiver.radius):
+        fix = "move the receiver away, and correct the rig"
+        raise InputError(fault, where="pouring.receiver", fix=fix)
 
 
 def execute_pour(
@@ -104,7 +197,7 @@ def execute_pour(
         run: A RUN directory, or a calibration, criticism or pour of it.
         rig: Where source and receiver are, or its file; None is the bundled one.
         ask: Shows a person the plan, returns what the person typed.
-        emulate: Use an emulator instead, as in `record`; a pour shows nothing of the liquid.
+        emulate: Use an emulated arm instead, as in `record`; a pour shows nothing of the liquid.
         despite_bad_fit: Whether a real arm may carry out what was chosen over a bad fit, by force.
         progress: Whether to show a live view on stderr.
 
@@ -131,25 +224,19 @@ def execute_pour(
             if plan.chosen.fit_is_bad:
                 logger.warning(BAD_FIT)
             logger.info(plan.chosen.expected)
-        return _carried_out(plan, rig, ask, emulate, progress)
+        return _carried_out(plan, rig, ask, progress)
 
 
-def _carried_out(
-    plan: PourMotion, rig: "Rig", ask: Ask | None, emulate: object, progress: bool
-) -> Path:
-    """The directory of what an arm, or its emulator, did."""
+def _carried_out(plan: PourMotion, rig: "Rig", ask: Ask | None, progress: bool) -> Path:
+    """The directory of what an arm did, or an emulated one."""
     from ..hardware import SessionInterrupted, emulated
     from ..hardware.motion import approach_pour
 
-    out = _next_directory(plan.chosen.run.path)
-    task = Task(rig, "pouring", [plan.path], out, about=str(plan.chosen))
-    emulation = None
-    if emulate:
-        start = emulated(rig, plan.ready, tool="pouring")
-        emulation = EmulatedRobot(start, source="emulated UR arm")
+    task = plan.task(rig)
+    by = ask or EmulatedRobot(emulated(rig, plan.ready, tool="pouring"), source="emulated UR arm")
     try:
         with (
-            armed_session(task, ask=ask, emulation=emulation) as session,
+            armed_session(task, by) as session,
             SessionView("pouring" if ask else "pouring, emulated", shown=progress) as view,
         ):
             session.follow(approach_pour(rig, session.pose(), **plan.place))
@@ -160,20 +247,13 @@ def _carried_out(
     return task.out
 
 
-def dry_pour(run: str | Path, rig: "Rig", out: Path) -> "tuple[str, list[Check]]":
+def dry_pour(run: RunOrPath, rig: "Rig") -> "tuple[str, list[Check]]":
     """What the arm would do, and the pre-flight list of a session that cannot move it.
 
     Raises:
         InputError, MotionRejected: As `plan_pour`.
     """
-    from ..hardware import Session, SessionSetup
-    from ..hardware.session.confirmation import describe
-
-    plan = plan_pour(Run.open(run), rig)
-    setup = SessionSetup(rig, out, tool="pouring", plan=[plan.path])
-    with Session(setup) as session:
-        text = f"{plan.chosen}\n{describe([plan.path], rig, 'pouring')}"
-        return text, session.preflight()
+    return dry_run(plan_pour(Run.open(run), rig).task(rig))
 
 
 def _next_directory(run: Path) -> Path:

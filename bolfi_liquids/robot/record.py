@@ -11,13 +11,13 @@ from ..inputs.open import check_recording, read_recording
 from ..inputs.recording import Recording
 from ..inputs.rigs import rig_of
 from ..wording import command
-from .armed_session import Ask, check_consent, hidden_liquid
+from .armed_session import Ask, check_consent, dry_run, hidden_liquid
 from .hidden_stir import with_stir
 from .live_view import SessionView
-from .stir import follow_plan, plan_stir, stir_session
+from .stir import follow_plan, plan_stir, stir_session, stir_task
 
 if TYPE_CHECKING:
-    from ..hardware import HiddenLiquid, Rig
+    from ..hardware import Check, HiddenLiquid, Rig
 
 
 def record(
@@ -38,8 +38,8 @@ def record(
         rig: What is there, or its file; None is the bundled one.
         out: Directory of the recording; new or empty.
         ask: Shows a person the plan, returns what the person typed.
-        emulate: Use an emulator and rendered cameras, which look at this liquid; True takes one
-            of 1 Pa s.
+        emulate: Use an emulated arm and rendered cameras, which look at this liquid; True takes
+            one of 1 Pa s.
         cycles: How often the pattern is repeated; None as in the rig's file.
         progress: Whether to show a live view on stderr, if that is a terminal.
 
@@ -58,14 +58,26 @@ def record(
     plan, out = plan_stir(opened, cycles), given_path(out, Argument("out"))
     check_new(out)
     title = "stirring" if hidden is None else "stirring, emulated"
-    hidden = None if hidden is None else with_stir(opened, plan, hidden)
+    by = ask if hidden is None else with_stir(opened, plan, hidden)
+    assert by is not None
     with (
         save_on_stop(out),
-        stir_session(opened, plan, out, ask=ask, emulate=hidden) as session,
+        stir_session(stir_task(opened, plan, out), by) as session,
         SessionView(title, shown=progress) as view,
     ):
         follow_plan(session, plan, view)
     return finished(out)
+
+
+def dry_stir(rig: "Rig", cycles: int | None, out: Path) -> "tuple[str, list[Check]]":
+    """The plan of a stir, and the pre-flight list of a session that cannot move the arm.
+
+    Raises:
+        InputError, MotionRejected: As `plan_stir`.
+        RigError: `out` holds something, or cannot be used.
+    """
+    check_new(out)
+    return dry_run(stir_task(rig, plan_stir(rig, cycles), out))
 
 
 def check_new(directory: Path) -> None:
@@ -102,7 +114,7 @@ def finished(directory: Path) -> Recording:
 
 @contextmanager
 def save_on_stop(directory: Path) -> Iterator[None]:
-    """What is left of a session that is stopped within becomes a recording.
+    """Save the frames taken before a stop as a recording.
 
     Raises:
         SessionStopped: It was stopped, or interrupted; the message says what is left.

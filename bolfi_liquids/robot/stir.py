@@ -1,4 +1,4 @@
-"""A stir carried out: by the robot, or by the emulator with rendered cameras."""
+"""A stir carried out: by the robot, or by an emulated arm with rendered cameras."""
 
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -15,7 +15,7 @@ from .armed_session import (
 from .live_view import SessionView
 
 if TYPE_CHECKING:
-    from ..hardware import Check, HiddenLiquid, Rig, Session
+    from ..hardware import HiddenLiquid, Rig, Session
     from ..hardware.motion import PosePath
 
 
@@ -55,13 +55,12 @@ def plan_stir(rig: "Rig", cycles: int | None = None) -> StirPlan:
     """
     from ..hardware import check_path
     from ..hardware.motion import insert, retract, strokes
-    from ..hardware.rig import MAX_CYCLES, checked_cycles
+    from ..hardware.rig import MAX_CYCLES
 
-    try:
-        count = checked_cycles(rig.stirring.cycles if cycles is None else cycles)
-    except ValueError as err:
+    count = rig.stirring.cycles if cycles is None else cycles
+    if not 1 <= count <= MAX_CYCLES:
         fix = f"give a whole number from 1 to {MAX_CYCLES}"
-        raise InputError(f"{cycles}", where=Argument("cycles"), fix=fix) from err
+        raise InputError(f"{count}", where=Argument("cycles"), fix=fix)
     if rig.stirring.rest < MIN_REST:
         raise InputError(
             f"{rig.stirring.rest:g} s",
@@ -76,40 +75,32 @@ def plan_stir(rig: "Rig", cycles: int | None = None) -> StirPlan:
     return plan
 
 
-def stir_session(
-    rig: "Rig",
-    plan: StirPlan,
-    out: Path,
-    *,
-    ask: Ask | None = None,
-    emulate: "HiddenLiquid | None" = None,
-) -> "AbstractContextManager[Session]":
+def stir_task(rig: "Rig", plan: StirPlan, out: Path) -> Task:
+    """A stir that the rig's cameras look at, recorded in a directory that is new or empty."""
+    return Task(rig, "stirring", plan.paths, out, cameras=True)
+
+
+def stir_session(task: Task, by: "Ask | HiddenLiquid") -> "AbstractContextManager[Session]":
     """A session that may move the arm: a person has agreed, or the arm is emulated.
 
     Args:
-        rig: What is there.
-        plan: That will be followed.
-        out: Directory of the recording; new or empty.
-        ask: Shows the plan; what it returns must be the sentence that the plan asks for.
-        emulate: Start an emulator and rendered cameras instead; nobody is asked. Its `stir` is that
-            of the plan.
+        task: As `stir_task` makes it.
+        by: Shows the plan; or the liquid of an emulated arm with rendered cameras, which nobody is
+            asked about. Its `stir` is that of the plan.
 
     Raises:
-        InputError: `ask` and `emulate` are both given, or neither is; or a camera is a file.
+        InputError: A camera is a file.
         RigError: The person did not agree, or something cannot be used.
     """
-    from ..hardware import emulated
+    from ..hardware import HiddenLiquid, emulated
     from ..hardware.motion import above_cup
 
-    task = Task(rig, "stirring", plan.paths, out, cameras=True)
-    if emulate is None:
-        _check_devices(rig)
-        return armed_session(task, ask=ask)
-    emulation = EmulatedRobot(
-        emulated(rig, above_cup(rig), liquid=emulate, truth=out),
-        source=f"emulated UR arm and rendered cameras, viscosity {emulate.viscosity} Pa s",
-    )
-    return armed_session(task, ask=ask, emulation=emulation)
+    if not isinstance(by, HiddenLiquid):
+        _check_devices(task.rig)
+        return armed_session(task, by)
+    rig = emulated(task.rig, above_cup(task.rig), liquid=by, truth=task.out)
+    source = f"emulated UR arm and rendered cameras, viscosity {by.viscosity} Pa s"
+    return armed_session(task, EmulatedRobot(rig, source))
 
 
 def _check_devices(rig: "Rig") -> None:
@@ -120,24 +111,6 @@ def _check_devices(rig: "Rig") -> None:
                 where=f"rig.toml: camera {camera.view}",
                 fix="a real arm moves only while real cameras look on: name a device",
             )
-
-
-def dry_run(rig: "Rig", plan: StirPlan, out: Path) -> list["Check"]:
-    """The pre-flight list of a session that cannot move the arm.
-
-    Args:
-        rig: What is there.
-        plan: That would be followed.
-        out: A directory for what is recorded meanwhile; new or empty.
-
-    Raises:
-        RigError: The directory cannot be used.
-    """
-    from ..hardware import Session, SessionSetup, webcams
-
-    setup = SessionSetup(rig, out, make_cameras=webcams(rig), plan=plan.paths)
-    with Session(setup) as session:
-        return session.preflight()
 
 
 def follow_plan(session: "Session", plan: StirPlan, view: SessionView) -> None:

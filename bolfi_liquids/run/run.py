@@ -54,9 +54,6 @@ OWN_FILES = (SIMULATIONS, *RESULTS.values(), GIVEN_POURS, RECORDINGS_FOLDER, FRA
 MUST_AGREE = ("settings", "inputs", "simulator", "engine")
 """Sections of run.toml that decide the results; dates, names and libraries may differ."""
 
-RESUMED_OPTIONS = ("budget", "surrogate", "sampler", "seed", "particles", "batch")
-"""Of the command `calibrate`."""
-
 ABSENT = {
     "calibrate": "the calibration in it is not finished",
     "criticise": "the calibration in it was not criticised",
@@ -200,12 +197,18 @@ class Run:
         """
         tree, why = self._look(step)
         if tree is None:
-            if step == "pour" and self.why_not("criticise"):  # which comes first
-                self.required("criticise")
+            for earlier in self._missing_before(step):
+                self.required(earlier)
             stale = step != "calibrate" and self.why_not(step)
             more = ", with the options it was made with" if stale else ""
             raise InputError(why, where=str(self.path), fix=f"run{more}: {self.again(step)}")
         return tree
+
+    def _missing_before(self, step: str) -> list[str]:
+        """Earlier steps that must be made again first: a run may do without a criticism."""
+        earlier = list(RESULTS)[: list(RESULTS).index(step)]
+        needed = [one for one in earlier if one == "calibrate" or self.why_not(one)]
+        return [one for one in needed if self.result(one) is None]
 
     def keep(
         self,
@@ -296,7 +299,7 @@ class Run:
     def _options(self) -> list[str]:
         """Options with which the run was started, where they are not the default."""
         settings, usual = self.record.get("settings", {}), asdict(CalibrationSettings())
-        given = {name: settings.get(name, usual[name]) for name in RESUMED_OPTIONS}
+        given = {name: settings.get(name, default) for name, default in usual.items()}
         changed = {name: value for name, value in given.items() if value != usual[name]}
         return [word for name, value in changed.items() for word in (f"--{name}", str(value))]
 

@@ -1,8 +1,10 @@
 """Liquids that are simulated in one call, by numbers or by arrays of them."""
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import Argument, InputError
 from ..inference.arguments import checked_array
 from ..inputs.described_liquid import Described
-from ..progress import Simulate
-from ..run.compute import Compute
-from ..run.fluid_simulator import FluidSimulator
-from .movies import failures_raised
+from ..simulators import FluidSimulator
+
+if TYPE_CHECKING:
+    from ..inference.simulations import Compute
 
 
 class Batch(NamedTuple):
@@ -110,25 +112,48 @@ class Raising(FluidSimulator):
         simulator: Warns and returns NaN there.
     """
 
-    simulator: Simulate
+    simulator: FluidSimulator
 
-    def simulate(self, theta: dict[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
+    def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """What the simulator returns.
 
         Raises:
             RuntimeError: A simulation went wrong.
         """
         with failures_raised():
-            return self.simulator(theta, seeds)
+            return self.simulator.simulate(theta, seeds)
+
+
+@contextmanager
+def failures_raised() -> Iterator[None]:
+    """Inside, a simulation that goes wrong is an error.
+
+    Raises:
+        RuntimeError: It went wrong.
+    """
+    from ..models import FailedSimulation
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", FailedSimulation)
+        try:
+            yield
+        except FailedSimulation as err:
+            raise RuntimeError(str(err)) from None
+
+
+def theta_of(described: Described) -> dict[str, float]:
+    """Parameters of a described liquid, and the coefficients of its effects."""
+    liquid = {"viscosity": described.viscosity, "cohesion": described.cohesion}
+    return liquid | dict(described.effects)
 
 
 def simulated(
-    simulate: Simulate, batch: Batch, compute: Compute, needed: slice = slice(None)
+    simulator: FluidSimulator, batch: Batch, compute: "Compute", needed: slice = slice(None)
 ) -> NDArray[np.float64]:
     """Signals of all liquids, shape (simulations, ...).
 
     Args:
-        simulate: As given to `inference.fit`.
+        simulator: Of stirs or pours.
         batch: The liquids; their density is the simulator's.
         compute: Where simulations run.
         needed: Part of a signal that is finite in all simulations that succeed.
@@ -136,15 +161,10 @@ def simulated(
     Raises:
         RuntimeError: A simulation failed.
     """
-    from ..inference import SimulationBank
     from ..inference.simulations import Job, run_missing
 
-    jobs = [
-        Job({"viscosity": one.viscosity, "cohesion": one.cohesion, **one.effects}, one.seed)
-        for one in batch.liquids
-    ]
-    with SimulationBank() as bank:
-        made = run_missing(Raising(simulate).simulate, jobs, compute.keep(bank))
+    jobs = [Job(theta_of(one), one.seed) for one in batch.liquids]
+    made = run_missing(Raising(simulator).simulate, jobs, compute)
     for job, one in zip(jobs, made, strict=True):
         if one.signal is None:
             raise RuntimeError(f"the simulation of {job.theta} failed: {one.error}")

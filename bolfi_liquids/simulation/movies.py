@@ -1,8 +1,6 @@
-"""Movies of a simulated stir or pour, and failures of a simulation as errors."""
+"""Movies of a simulated stir or pour."""
 
-import warnings
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,30 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..inputs.described_liquid import Described
-from ..inputs.recording import Recording
 from ..movie.file import PICTURE_RATE, write_movie
 from ..progress import progress_bar
+from ..simulators import RATE, PourSimulator, StirSimulator
+from .batch import failures_raised, theta_of
 
 if TYPE_CHECKING:
-    from ..models import Cups, Landings, PourAction, StirSetup
+    from ..models import Landings, PourAction
 
 
-def film_stir(
-    movie: Path, described: Described, recording: Recording, setup: "StirSetup", progress: bool
-) -> None:
-    """Simulate a stir again, and write what it looks like."""
-    from .. import models
+def film_stir(movie: Path, described: Described, simulator: StirSimulator, progress: bool) -> None:
+    """Simulate a stir of one recording again, and write what it looks like."""
     from ..movie.stir import stir_pictures
 
+    (recording,), (setup,) = simulator.recordings, simulator.setups
     with failures_raised():
-        frames = models.stir_frames(
-            described.liquid(),
-            recording.gripper,
-            setup,
-            described.seed,
-            rate=PICTURE_RATE,
-            effects=described.effects,
-        )
+        frames = simulator.frames(theta_of(described), described.seed, PICTURE_RATE)
     lines = described.lines()
     caption = [*lines[:2], f"{recording.path.name}, {lines[2]}"]
     _write(movie, stir_pictures(frames, setup, caption), len(frames.time), progress)
@@ -42,7 +32,7 @@ def film_stir(
 def film_pour(
     movie: Path,
     described: Described,
-    cups: "Cups",
+    simulator: PourSimulator,
     action: "PourAction",
     landings: "Landings",
     progress: bool,
@@ -53,17 +43,11 @@ def film_pour(
 
     rate, distance = (float(np.asarray(x)) for x in (action.angular_velocity, action.distance))
     with failures_raised():
-        batch = models.PourBatch(
-            described.liquid(),
-            rate,
-            cups,
-            [described.seed],
-            described.particles,
-            described.effects,
-        )
+        batch = simulator.batch({**theta_of(described), RATE: rate}, [described.seed])
         frames = models.pour_frames(batch, rate=PICTURE_RATE)
     turn = f"{np.degrees(rate):g}°/s, lip to axis {100 * distance:g} cm"
-    pictures = pour_pictures(frames, landings, cups, distance, [*described.lines(), turn])
+    caption = [*described.lines(), turn]
+    pictures = pour_pictures(frames, landings, simulator.cups, distance, caption)
     _write(movie, pictures, len(frames.time), progress)
 
 
@@ -76,20 +60,3 @@ def _write(path: Path, pictures: Iterable[NDArray], count: int, progress: bool) 
                 advance(1)
 
         write_movie(path, counted())
-
-
-@contextmanager
-def failures_raised() -> Iterator[None]:
-    """Inside, a simulation that goes wrong is an error.
-
-    Raises:
-        RuntimeError: It went wrong.
-    """
-    from ..models import FailedSimulation
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", FailedSimulation)
-        try:
-            yield
-        except FailedSimulation as err:
-            raise RuntimeError(str(err)) from None

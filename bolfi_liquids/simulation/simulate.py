@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..calibration.stir_simulator import Stirring
 from ..errors import Argument, InputError
 from ..files import write_netcdf
 from ..inputs.bundled import bundled_recording
@@ -24,10 +23,9 @@ from ..inputs.described_liquid import (
 from ..inputs.fields import LENGTHS, STICK_WEIGHT
 from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import check_distance, check_rate
-from ..inputs.prior import split_parameters
 from ..inputs.recording import Recording, Trajectory
 from ..run.compute import open_compute
-from ..run.fluid_simulator import FluidSimulator
+from ..simulators import RATE, Batched, PourSimulator, StirSimulator
 from .batch import batch_of, simulated
 from .files import check_targets, pour_dataset, stir_dataset
 from .movies import film_pour, film_stir
@@ -120,13 +118,14 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     batch = batch_of(liquid, effects, count, seed)
     targets.check_single(batch.single)
     setup = StirSetup.from_recording(plan, particles=batch.one.particles)
+    simulator = StirSimulator((plan,), (setup,))
     with open_compute(executor, timeout) as compute:
-        angles = simulated(Stirring((plan,), (setup,)).simulate, batch, compute)
+        angles = simulated(simulator, batch, compute)
     found = stir_dataset(batch, plan, angles)
     if targets.out is not None:
         write_netcdf(found, targets.out)
     if targets.movie is not None:
-        film_stir(targets.movie, batch.one, plan, setup, progress)
+        film_stir(targets.movie, batch.one, simulator, progress)
     return found
 
 
@@ -192,35 +191,27 @@ def _planned(recording: Recording, path: str | TimedPath | None) -> Recording:
 
 
 @dataclass(frozen=True)
-class PourSimulator(FluidSimulator):
-    """One pour of liquids, as a simulator.
+class LandedParticles:
+    """The retained fraction, then the landing of each particle [m]: (B, 1 + 2 particles).
 
     Attributes:
         angular_velocity: Angular velocity of the source [rad/s].
-        cups: Source and receiver.
-        density: Density of the liquids [kg/m3].
-        particles: Number of particles of each; 0: cells follow the cup.
     """
 
     angular_velocity: float
-    cups: "Cups"
-    density: float
-    particles: int
 
-    def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
-        """The retained fraction, then the landing of each particle [m]: (B, 1 + 2 particles)."""
+    def __call__(
+        self, batch: Batched, theta: Mapping[str, NDArray], seeds: NDArray
+    ) -> NDArray[np.float64]:
         from .. import models
 
-        liquid, effects = split_parameters(theta)
-        landed = models.landings(
-            models.Liquid(**liquid, density=self.density),
-            self.angular_velocity,
-            self.cups,
-            seeds,
-            self.particles,
-            effects,
-        )
+        landed = models.landings(*batch({**theta, RATE: self.angular_velocity}, seeds))
         return np.column_stack([landed.retained, landed.position.reshape(len(seeds), -1)])
+
+    @property
+    def settings(self) -> list[Any]:
+        """The angular velocity."""
+        return ["landings", self.angular_velocity]
 
 
 def simulate_pour(  # noqa: PLR0913  the one call that most users make
@@ -271,10 +262,11 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     check_rate(angular_velocity, cups, Argument("angular_velocity"))
     batch = batch_of(liquid, check_effects(effects, "pour"), particles, seed)
     targets.check_single(batch.single)
-    simulator = PourSimulator(angular_velocity, cups, density, batch.one.particles)
+    outcome, particles = LandedParticles(angular_velocity), batch.one.particles
+    simulator = PourSimulator(cups, density, outcome, particles=particles)
     retained = slice(0, 1)  # what has not landed is NaN
     with open_compute(executor, timeout) as compute:
-        signals = simulated(simulator.simulate, batch, compute, retained)
+        signals = simulated(simulator, batch, compute, retained)
     position = signals[:, 1:].reshape(len(signals), -1, 2).astype(np.float32)
     landings = Landings(position, signals[:, 0])
     action = PourAction(angular_velocity, distance)
@@ -282,7 +274,7 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     if targets.out is not None:
         write_netcdf(found, targets.out)
     if targets.movie is not None:
-        film_pour(targets.movie, batch.one, cups, action, landings, progress)
+        film_pour(targets.movie, batch.one, simulator, action, landings, progress)
     return found
 
 

@@ -1,4 +1,4 @@
-"""What every camera gives: frames with the camera's own time and the time of arrival."""
+"""What every camera gives: frames with the time at which it gave them."""
 
 from typing import Protocol
 

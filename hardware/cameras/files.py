@@ -1,7 +1,6 @@
 """Frames from a video file or a directory of pictures, through the interface of a camera."""
 
 import re
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -52,7 +51,7 @@ class FilesCamera:
         """
         if self._first is not None:
             frame, self._first = self._first, None
-            return frame._replace(host=time.monotonic())
+            return frame
         return next(self._frames, None)
 
     def close(self) -> None:
@@ -82,7 +81,7 @@ def _pictures(names: list[Path], rate: float) -> Iterator[Frame]:
         image = cv2.imread(str(name), cv2.IMREAD_GRAYSCALE)
         if image is None:
             raise CameraError(f"{name} is no picture that OpenCV can read; remove it")
-        yield Frame(index, index / rate, time.monotonic(), image)
+        yield Frame(index, index / rate, image)
 
 
 def _video(path: Path) -> Iterator[Frame]:
@@ -95,7 +94,7 @@ def _video(path: Path) -> Iterator[Frame]:
             if not seen:
                 return
             stamp = 1e-3 * capture.get(cv2.CAP_PROP_POS_MSEC)
-            yield Frame(index, stamp, time.monotonic(), np.ascontiguousarray(grey(image)))
+            yield Frame(index, stamp, np.ascontiguousarray(grey(image)))
             index += 1
     finally:
         capture.release()

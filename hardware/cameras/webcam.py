@@ -13,7 +13,7 @@ from .base import CameraError, grey
 V4L2_MANUAL_EXPOSURE = 1.0
 WARM_UP_FRAMES = 5  # the first ones of many webcams are dark or half a picture
 BUFFERS = 3
-HOST_AGREEMENT = 5.0  # s; a driver's stamp further off is no time of this computer
+MIN_WAIT = 1e-3  # s; a picture that comes sooner was waiting for an unknown time
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,6 @@ class Webcam:
         settings = WebcamSettings() if settings is None else settings
         self._source = source
         self._index = 0
-        self._stamped = False
         self._capture = opencv().VideoCapture(source)
         try:
             if not self._capture.isOpened():
@@ -59,49 +58,52 @@ class Webcam:
             raise
 
     def read(self) -> Frame | None:
-        """The next frame.
+        """The next frame that the driver has not kept: only of such a one the time is known.
 
         Raises:
             CameraError: the camera stopped to deliver.
         """
-        image = self._grab()
-        host = time.monotonic()
-        # the clocks of two frames must not differ: a stamp that stands is left out later on
-        stamp = self._stamp() if self._stamped else host
-        self._index += 1
-        return Frame(self._index - 1, stamp, host, np.ascontiguousarray(grey(image)))
+        asked, stamp, grabbed = time.monotonic(), self._grab(), 1
+        while stamp - asked < MIN_WAIT and grabbed < BUFFERS:
+            asked, stamp, grabbed = stamp, self._grab(), grabbed + 1
+        image = self._retrieve()
+        return Frame(self._index - 1, stamp, np.ascontiguousarray(grey(image)))
 
     def close(self) -> None:
         """Let the device go."""
         self._capture.release()
 
-    def _grab(self) -> np.ndarray:
-        seen, image = self._capture.read()
+    def _grab(self) -> float:
+        """Wait for the driver's next picture; when it came [s]."""
+        if not self._capture.grab():
+            raise self._silent()
+        stamp = time.monotonic()
+        self._index += 1
+        return stamp
+
+    def _retrieve(self) -> np.ndarray:
+        seen, image = self._capture.retrieve()
         if not seen or image is None:
-            raise CameraError(
-                f"camera {self._source!r} delivers no picture after frame {self._index}: check "
-                "its cable, and that it does not share one USB hub with the other camera"
-            )
+            raise self._silent()
         return image
 
+    def _silent(self) -> CameraError:
+        return CameraError(
+            f"camera {self._source!r} delivers no picture after frame {self._index}: check "
+            "its cable, and that it does not share one USB hub with the other camera"
+        )
+
     def _warm_up(self, size: tuple[int, int]) -> None:
-        """Take frames until the camera gives good ones, and see whether its driver stamps them."""
-        stamps, ages = [], []
+        """Take frames until the camera gives good ones."""
         for _ in range(WARM_UP_FRAMES):
-            height, width = self._grab().shape[:2]
-            stamps.append(self._stamp())
-            ages.append(abs(time.monotonic() - stamps[-1]))
+            self._grab()
+            height, width = self._retrieve().shape[:2]
             if (width, height) != size:
                 raise CameraError(
                     f"camera {self._source!r} delivers {width}x{height} instead of "
                     f"{size[0]}x{size[1]}: set a size that it has, and calibrate it at that size"
                 )
-
-        self._stamped = bool((np.diff(stamps) > 0).all()) and max(ages) < HOST_AGREEMENT
-
-    def _stamp(self) -> float:
-        """V4L2's time of the latest frame [s]; something else with other drivers."""
-        return 1e-3 * self._capture.get(opencv().CAP_PROP_POS_MSEC)
+        self._index = 0
 
 
 def _set_up(capture: Any, settings: WebcamSettings) -> None:

@@ -121,7 +121,7 @@ def forward_matrix(arm: DhArm, joints: Numbers, *, tcp: Numbers | None = None) -
 def _frames(arm: DhArm, joints: Numbers) -> list[_Frame]:
     """The base and the six frames behind the joints.
 
-    In plain floats, since the emulator asks for them every tick: 6 us, and 50 us as a product of
+    In plain floats, since an emulated arm asks for them every tick: 6 us, and 50 us as a product of
     six matrices.
     """
     frames = [_BASE]

@@ -1,6 +1,6 @@
 """Poses: position [m] and rotation vector [rad], six numbers, as UR controllers write them.
 
-The emulator turns them 500 times a second: a matrix takes 2 us of CPU time here and 11 us by
+An emulated arm turns them at each of its ticks: a matrix takes 2 us of CPU time here and 11 us by
 scipy's Rotation, a rotation vector 1 us and 47 us, where 10 us are the limit.
 """
 

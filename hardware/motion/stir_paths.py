@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..rig import Rig, checked_cycles
+from ..rig import MAX_CYCLES, Rig
 from .patterns import circle, star_vertices, travelled
 
 TURN_RATE = np.radians(30.0)  # rad/s, of the tool between two orientations
@@ -117,9 +117,11 @@ def strokes(rig: Rig, cycles: int | None = None) -> list[PosePath]:
     circle never rests on its way: its cycles are its strokes.
 
     Raises:
-        ValueError: `cycles` is below 1 or too large, see `checked_cycles`.
+        ValueError: `cycles` is below 1 or above `MAX_CYCLES`.
     """
-    count = checked_cycles(rig.stirring.cycles if cycles is None else cycles)
+    count = rig.stirring.cycles if cycles is None else cycles
+    if not 1 <= count <= MAX_CYCLES:
+        raise ValueError(f"cycles: {count} is not from 1 to {MAX_CYCLES}")
     if rig.stirring.pattern == "circle":
         return [_circle(rig)] * count
     plan = rig.stirring

@@ -14,7 +14,6 @@ from pydantic import ValidationError
 from ..board import host_time
 from ..errors import RigError
 from ..rig import Rig, View
-from ..rig_numbers import RECORDED
 from ..vision.camera_model import CameraModel, as_fields, from_fields
 from .events import EVENTS, FULL, drop_reserve, make_reserve, read_events
 from .names import frames_file, truth_file, video_file
@@ -88,8 +87,7 @@ def start_directory(
         directory.mkdir(parents=True, exist_ok=True)
         check_empty(directory)
         _check_room(directory, expected_bytes(rig, duration, videos=videos))
-        _write_first(directory / RIG, json.dumps(written, indent=1) + "\n")
-        _reserve(directory)
+        _begin(directory, json.dumps(written, indent=1) + "\n")
     except OSError as err:
         full = err.errno in FULL
         raise RigError(
@@ -146,8 +144,8 @@ def read_provenance(directory: Path) -> Provenance:
     try:
         written = json.loads(path.read_text(encoding="utf-8"))
         return Provenance(
-            # a recording stays readable whatever ends an arm's numbers have since
-            rig=Rig.model_validate(written["rig"], context=RECORDED),
+            # without `checked_rig`: it stays readable whatever ends an arm's numbers have since
+            rig=Rig.model_validate(written["rig"]),
             hash=written["hash"],
             cameras={view: from_fields(written["cameras"][view]) for view in VIEWS},
             version=written["version"],
@@ -182,23 +180,19 @@ def check_empty(directory: Path) -> None:
         )
 
 
-def _write_first(path: Path, text: str) -> None:
-    """Write a file that nobody else has begun: of two sessions that start together one goes on."""
+def _begin(directory: Path, text: str) -> None:
+    """Write rig.json and set the reserve aside, both or neither.
+
+    Of two sessions that start together one goes on.
+    """
     try:
-        file = path.open("x", encoding="utf-8")
+        file = (directory / RIG).open("x", encoding="utf-8")
     except FileExistsError:
-        check_empty(path.parent)
+        check_empty(directory)
         raise
     try:
         with file:
             file.write(text)
-    except OSError:  # leave nothing in the way of the next try
-        path.unlink()
-        raise
-
-
-def _reserve(directory: Path) -> None:
-    try:
         make_reserve(directory)
     except OSError:  # leave nothing in the way of the next try
         drop_reserve(directory)

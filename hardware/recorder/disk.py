@@ -32,7 +32,7 @@ class Disk:
             self.trouble = Trouble.WRITE_FAILED
             cure = " (make room)" if err.errno in FULL else ""
             reason = f"{name}: {err.strerror or err}{cure}"
-            self.tell("write_failed", file=name, reason=reason)
+            self.tell(self.trouble.kind, file=name, reason=reason)
         self.slowest = max(self.slowest, host_time() - start)
 
     def tell(self, kind: str, **fields: Any) -> None:

@@ -10,7 +10,7 @@ from ..board import host_time
 
 EVENTS = "events.jsonl"
 RESERVE = ".reserve"  # given up when the disk is full, so that the reason can still be written
-RESERVE_FILES = 16  # one for each event: what is free, the other writers take at once
+RESERVE_PARTS = 16  # one for each event: what is free, the other writers take at once
 RESERVE_BYTES = 16_384  # of each
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # how a disk says that there is no room
 
@@ -58,30 +58,24 @@ def make_reserve(directory: Path) -> None:
     Raises:
         OSError: There is no room.
     """
-    reserve = directory / RESERVE
-    reserve.mkdir(exist_ok=True)
-    for number in range(RESERVE_FILES):
-        with (reserve / str(number)).open("wb") as file:
-            os.posix_fallocate(file.fileno(), 0, RESERVE_BYTES)
+    with (directory / RESERVE).open("wb") as file:
+        os.posix_fallocate(file.fileno(), 0, RESERVE_PARTS * RESERVE_BYTES)
 
 
 def drop_reserve(directory: Path) -> None:
     """Give all of the reserve back, at the end of a session."""
-    while _give_up_reserve(directory):
-        pass
-    if (directory / RESERVE).is_dir():
-        (directory / RESERVE).rmdir()
+    (directory / RESERVE).unlink(missing_ok=True)
 
 
 def _give_up_reserve(directory: Path) -> bool:
-    """Free one file of the reserve; whether there was one."""
-    for number in range(RESERVE_FILES):
-        try:
-            (directory / RESERVE / str(number)).unlink()
-        except FileNotFoundError:  # or another process was faster
-            continue
-        return True
-    return False
+    """Free one part of the reserve; whether there was one."""
+    reserve = directory / RESERVE
+    try:
+        left = reserve.stat().st_size
+        os.truncate(reserve, max(left - RESERVE_BYTES, 0))
+    except FileNotFoundError:
+        return False
+    return left > 0
 
 
 def read_events(directory: Path) -> list[dict[str, Any]]:

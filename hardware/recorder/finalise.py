@@ -10,7 +10,6 @@ import numpy as np
 from ..netcdf import netcdf_content
 from ..rig import Rig
 from ..vision.frame_measurement import BAD_LINE, Flag
-from .clock_steps import without_steps
 from .directory import VIEWS
 from .events import drop_reserve, read_events
 from .outcome import outcome
@@ -28,7 +27,7 @@ CAMERAS = "UR arm and two cameras, by bolfi-liquids"
 def finalise(directory: str | Path) -> Path:
     """Make the recording of a session; it may have been killed at any time.
 
-    The cameras' clocks are brought to the robot's by the marker on the gripper, both views are
+    The marker on the gripper tells the delay between each camera and the robot, both views are
     joined, and the stir is cut out and resampled at 30 Hz ("To Stir or Not to Stir"). The file
     is written whole or not at all; an earlier one is replaced.
 
@@ -43,8 +42,8 @@ def finalise(directory: str | Path) -> Path:
         OSError: The file cannot be written.
     """
     directory = Path(directory)
-    raw, clocks = without_steps(read_raw(directory), str(directory))
-    stir = extract_stir(raw, str(directory), clocks=clocks)
+    raw = read_raw(directory)
+    stir = extract_stir(raw, str(directory))
     drop_reserve(directory)  # room for the recording, where the disk is full
     dataset = _as_dataset(stir, _attributes(directory, raw, stir))
     return _write_whole(dataset, directory / RECORDING)
@@ -109,7 +108,6 @@ def _attributes(directory: Path, raw: Raw, stir: Stir) -> dict[str, float | int 
             "marker_misfit_px": clock.misfit,
             "flagged": float(doubtful.mean()),
             "frame_rate": _rate(frames["stamp"]),
-            "bad_stamps": raw.stamps[view].left_out,
             "lost_frames": max(lost_rows(frames["index"]), missed(frames["stamp"])),
         }
         attributes |= {f"camera_{view}_{name}": value for name, value in numbers.items()}

@@ -3,9 +3,11 @@
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from ..board import Trouble
+
 CONTROL = "control"  # the source whose word counts
-BAD_STAMPS, WRITE_FAILED = "bad_stamps", "write_failed"
-TROUBLES = ("refused", WRITE_FAILED, "source_lost", "same_picture", BAD_STAMPS, "failed")
+DETAILS = Trouble.BAD_STAMPS.kind, Trouble.WRITE_FAILED.kind
+TROUBLES = (*DETAILS, Trouble.SOURCE_LOST.kind, Trouble.SAME_PICTURE.kind, "refused", "failed")
 SILENT = "the session ended without a word: it was killed, or power was lost"
 
 Events = Sequence[dict[str, Any]]
@@ -40,7 +42,7 @@ def detailed(reason: str, events: Events) -> str:
     Control tells only that stamps are bad or that something is not written; the process that has
     complained of it says from which frame on, or which file and why.
     """
-    known = (event for event in events if event["kind"] in (BAD_STAMPS, WRITE_FAILED))
+    known = (event for event in events if event["kind"] in DETAILS)
     return "; ".join([reason, *[_reason(event) for event in known][:1]])
 
 

@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 from ..errors import RigError
 from ..rig import View
 from ..vision.frame_measurement import FrameMeasurement
-from ..vision.inclination import ViewLines
-from ..vision.measurement_series import FrameSeries
 from .csv_file import read_csv
 from .directory import VIEWS, Provenance, read_provenance
 from .names import frames_file
 from .sample import SAMPLES, Sample
-from .stamps import JudgedStamps, judged_stamps
+from .stamps import first_fault
 
 LEAST_SAMPLES = 50
 LEAST_FRAMES = 30
@@ -28,16 +26,16 @@ class Raw(NamedTuple):
     Attributes:
         provenance: Of the session.
         samples: Columns of samples.csv, times rising.
-        frames: Columns of each view's frames, stamps rising.
+        frames: Columns of each view's frames up to its first fault, stamps rising.
         lost_samples: Rows that the control process took and samples.csv lacks.
-        stamps: What each view's frames were judged by; those that are no times are left out.
+        faults: Why a view's later frames cannot be used; empty where nothing is wrong.
     """
 
     provenance: Provenance
     samples: Columns
     frames: dict[View, Columns]
     lost_samples: int
-    stamps: dict[View, JudgedStamps]
+    faults: dict[View, str]
 
 
 def read_raw(directory: Path) -> Raw:
@@ -49,31 +47,17 @@ def read_raw(directory: Path) -> Raw:
     provenance = read_provenance(directory)
     rows = _read(directory / SAMPLES, Sample._fields)
     samples = _rising(rows, "time")
-    seen: dict[View, Columns] = {
-        view: _read(directory / frames_file(view), FrameMeasurement._fields) for view in VIEWS
-    }
-    stamps: dict[View, JudgedStamps] = {
-        view: judged_stamps(of["index"], of["stamp"], of["host"]) for view, of in seen.items()
-    }
-    frames: dict[View, Columns] = {
-        view: {name: values[stamps[view].good] for name, values in of.items()}
-        for view, of in seen.items()
-    }
+    begin = samples["host"][samples["stirring"] == 1].min(initial=np.inf)
+    frames: dict[View, Columns] = {}
+    faults: dict[View, str] = {}
+    for view in VIEWS:
+        seen = _read(directory / frames_file(view), FrameMeasurement._fields)
+        end, faults[view] = first_fault(seen["index"], seen["stamp"], begin)
+        frames[view] = {name: values[:end] for name, values in seen.items()}
     counts = {SAMPLES: len(samples["time"])}
     counts |= {frames_file(view): len(frames[view]["stamp"]) for view in VIEWS}
-    faults = [f"view {view}: {one.fault}" for view, one in stamps.items() if one.fault]
-    _check_enough(directory, counts, faults)
-    return Raw(provenance, samples, frames, lost_rows(rows["index"]), stamps)
-
-
-def frame_series(frames: Columns) -> FrameSeries:
-    """A view's frames in the form that the joining takes."""
-    return FrameSeries(
-        stamp=frames["stamp"],
-        marker=np.column_stack([frames["marker_column"], frames["marker_row"]]),
-        lines=ViewLines(*(frames[name] for name in ViewLines._fields)),
-        flags=frames["flags"].astype(np.int64),
-    )
+    _check_enough(directory, counts, [f"view {view}: {one}" for view, one in faults.items() if one])
+    return Raw(provenance, samples, frames, lost_rows(rows["index"]), faults)
 
 
 def lost_rows(index: NDArray[np.float64]) -> int:

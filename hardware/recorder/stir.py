@@ -1,6 +1,5 @@
 """The stir in a session's raw data: one table of gripper and stick on the robot's clock."""
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -12,9 +11,9 @@ from ..rig import View
 from ..vision.clock import Clock, ClockError, fit_clock
 from ..vision.frame_measurement import BAD_LINE
 from ..vision.joined_views import MeasuredView, join
-from ..vision.measurement_series import FrameSeries
+from ..vision.measurement_series import FrameSeries, frame_series
 from .directory import VIEWS
-from .raw import Columns, Raw, frame_series
+from .raw import Columns, Raw
 
 TABLE_RATE = 30.0  # of the table [1/s]; the cameras' in "To Stir or Not to Stir"
 CLOCK_MARGIN = 1.0  # [s] before and after the stir that the clocks are learned from, too
@@ -55,33 +54,27 @@ class Span(NamedTuple):
     cut: str = ""
 
 
-def extract_stir(
-    raw: Raw, where: str, until: float = np.inf, *, clocks: Mapping[View, Clock] | None = None
-) -> Stir:
+def extract_stir(raw: Raw, where: str, until: float = np.inf) -> Stir:
     """Cut out the stir, bring the cameras to the robot's clock, and join both views.
 
     Args:
         raw: Of a session.
         where: Its directory, for a refusal.
         until: Take nothing after this time of the robot's clock [s].
-        clocks: Of cameras that are known already, by `view_clock` of the same data.
 
     Raises:
         RigError: There is no stir, it is too short, or a camera's clock cannot be found.
     """
-    span = stirred(raw.samples, where, until)
+    span = _stirred(raw.samples, where, until)
     _check_length(span, where)
     series = {view: frame_series(raw.frames[view]) for view in VIEWS}
-    known = {} if clocks is None else clocks
-    fitted: dict[View, Clock] = {
-        view: known.get(view) or view_clock(raw, view, span) for view in VIEWS
-    }
+    clocks: dict[View, Clock] = {view: _clock(raw, view, span) for view in VIEWS}
     for view in VIEWS:
-        span = _seen(span, series[view], fitted[view], f"view {view}", raw.stamps[view].fault)
+        span = _seen(span, series[view], clocks[view], f"view {view}", raw.faults[view])
     _check_length(span, where)
     time = np.arange(np.floor((span.last - span.first) * TABLE_RATE + 1e-6) + 1) / TABLE_RATE
     times = span.first + time
-    xz, yz = (MeasuredView(series[v], fitted[v], raw.provenance.cameras[v]) for v in VIEWS)
+    xz, yz = (MeasuredView(series[v], clocks[v], raw.provenance.cameras[v]) for v in VIEWS)
     joined = join(xz, yz, times)
     position = [np.interp(times, raw.samples["time"], raw.samples[axis]) for axis in "xyz"]
     unknown = _in_gap(raw.samples["time"], times)
@@ -92,7 +85,7 @@ def extract_stir(
         error=joined.error,
         flags=joined.flags,
         origin=span.first,
-        clocks=fitted,
+        clocks=clocks,
         cut=span.cut,
     )
 
@@ -103,7 +96,7 @@ def _in_gap(time: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np
     return time[after] - time[after - 1] > LONGEST_GAP
 
 
-def stirred(samples: Columns, where: str, until: float = np.inf) -> Span:
+def _stirred(samples: Columns, where: str, until: float) -> Span:
     """From the first to the last sample of the stir, or up to a gap between them."""
     time = samples["time"]
     stirring = np.flatnonzero((samples["stirring"] == 1) & (time <= until))
@@ -124,7 +117,7 @@ def stirred(samples: Columns, where: str, until: float = np.inf) -> Span:
     )
 
 
-def way_near(samples: Columns, span: Span) -> Trajectory:
+def _way_near(samples: Columns, span: Span) -> Trajectory:
     """The gripper's positions that the clocks of a stir are learned from."""
     near = (samples["time"] > span.first - CLOCK_MARGIN) & (
         samples["time"] < span.last + CLOCK_MARGIN
@@ -133,22 +126,20 @@ def way_near(samples: Columns, span: Span) -> Trajectory:
     return Trajectory(samples["time"][near], path)
 
 
-def view_clock(raw: Raw, view: View, span: Span) -> Clock:
+def _clock(raw: Raw, view: View, span: Span) -> Clock:
     """The clock of a camera.
 
     Raises:
         RigError: It cannot be found.
     """
-    samples, frames, fault = raw.samples, raw.frames[view], raw.stamps[view].fault
-    to_host = float(np.median(samples["time"] - samples["host"]))
-    guess = to_host + float(np.median(frames["host"] - frames["stamp"]))
+    samples, fault = raw.samples, raw.faults[view]
     try:
         return fit_clock(
-            frame_series(frames),
-            way_near(samples, span),
+            frame_series(raw.frames[view]),
+            _way_near(samples, span),
             raw.provenance.cameras[view],
             raw.provenance.rig.camera(view).marker,
-            guess=guess,
+            guess=float(np.median(samples["time"] - samples["host"])),
         )
     except ClockError as err:
         raise RigError(

@@ -18,12 +18,7 @@ def camera_model(camera: Camera) -> CameraModel:
     Raises:
         RigError: The file of its lens cannot be used, or it looks straight up or down.
     """
-    try:
-        rotation = look_at(
-            np.array(camera.position), np.array(camera.target), np.radians(camera.roll_deg)
-        )
-    except CameraModelError as err:
-        raise RigError(str(err), where=f"cameras: {camera.view}", fix="correct rig.toml") from err
+    rotation = orientation(camera)
     size, place = (camera.width, camera.height), np.array(camera.position)
     if camera.intrinsics is None:
         focal = float(camera.focal_length or np.nan)
@@ -31,6 +26,19 @@ def camera_model(camera: Camera) -> CameraModel:
         return CameraModel((focal, focal), middle, size, rotation, place)
     lens = _lens(camera)
     return CameraModel(lens.focal, lens.centre, size, rotation, place, lens.distortion)
+
+
+def orientation(camera: Camera) -> np.ndarray:
+    """Turns vectors of the cup frame into the camera's, shape (3, 3); see `look_at`.
+
+    Raises:
+        RigError: It looks straight up or down.
+    """
+    position, target = np.array(camera.position), np.array(camera.target)
+    try:
+        return look_at(position, target, np.radians(camera.roll_deg))
+    except CameraModelError as err:
+        raise RigError(str(err), where=f"cameras: {camera.view}", fix="correct rig.toml") from err
 
 
 def _lens(camera: Camera) -> CameraModel:

@@ -66,7 +66,6 @@ class Look:
     faults: float = 0.1
 
 
-CLEAN = Look(clutter=0.0, exposure=0.0, defocus=0.0, read_noise=0.0, shot_noise=0.0, faults=0.0)
 BRIGHT_STICK = Look(background=50.0, stick=210.0, liquid=90.0, gripper=30.0)
 
 

@@ -1,7 +1,5 @@
 """What the rendered cameras look at: where the gripper is and how the stick hangs."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -27,26 +25,6 @@ class World(Protocol):
     def state(self, host: float) -> WorldState:
         """The scene at a time of this computer's clock [s]."""
         ...
-
-
-@dataclass(frozen=True)
-class MovingWorld:
-    """A motion given by formulae.
-
-    Attributes:
-        pivot: Position [m], shape (3,), at a time of the robot's clock [s].
-        inclination: Of the stick [rad], shape (2,), at a time of the robot's clock [s].
-        offset: Robot's clock minus this computer's [s].
-    """
-
-    pivot: Callable[[float], np.ndarray]
-    inclination: Callable[[float], np.ndarray]
-    offset: float = 0.0
-
-    def state(self, host: float) -> WorldState:
-        """The scene at a time of this computer's clock [s]."""
-        time = host + self.offset
-        return WorldState(time, self.pivot(time), self.inclination(time))
 
 
 def direction(inclination: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arm import ArmReader, ArmState, LinkLost, PathFollower
+from ..arm import LOOKAHEAD, WATCHDOG_PERIOD, ArmState, LinkLost, PathFollower
 from ..board import Board, Row, Trouble, Who
 from ..errors import RigError
 from ..host_clock import REAL_CLOCK, HostClock
@@ -40,11 +40,9 @@ from .orders import (
 from .path_queue import Course, Leg, Trail, advanced, queued
 from .preparation import Prepared, others
 from .sample_queue import Outlet
-from .ur import LOOKAHEAD, WATCHDOG_RATE, URArm
 
 SETTLING_PERIODS = 3  # until the controller's program listens again after an order it answers
 CHECK_ROOM = 0.5  # of a period, that must be left of it for a slice of a path's check
-WATCHDOG_PERIOD = 1.0 / WATCHDOG_RATE  # s
 MOST_WAIT = 0.5  # of a period, for a package that is late
 PULL, MOST_PULL = 0.05, 2e-4  # share of the loop's phase that a tick mends, and at most [s]
 MAX_LAG = LOOKAHEAD + 0.1  # s, by which the arm may lag behind its set-points
@@ -115,8 +113,8 @@ class ControlLoop:
         self._clock = clock
         rig = assignment.rig
         self._to = assignment
-        self._reader: ArmReader = prepared.arm
-        self._arm: PathFollower | None = prepared.arm if isinstance(prepared.arm, URArm) else None
+        self._reader = prepared.reader
+        self._arm = prepared.follower
         self._checks = prepared.checks
         self._board = links.board
         self._log = links.log

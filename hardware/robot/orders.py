@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arm import Controller, Tool
 from ..motion.stir_paths import PosePath
 from ..rig import Rig
 from ..safety.guards import Reading
-from ..safety.limits import Tool
 from ..safety.preflight import Check
 
 
@@ -18,7 +18,7 @@ class Assignment(NamedTuple):
 
     Attributes:
         rig: Its limits and its robot.
-        address: Of the controller.
+        controller: Opens the arm.
         tool: What is in the gripper.
         armed: Whether it may move the arm; otherwise it only looks.
         directory: Of the recording, as text.
@@ -28,7 +28,7 @@ class Assignment(NamedTuple):
     """
 
     rig: Rig
-    address: str
+    controller: Controller
     tool: Tool
     armed: bool
     directory: str

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arm import ArmState, LinkLost
+from ..arm import ArmReader, ArmState, LinkLost, PathFollower
 from ..board import Board, Row, Who
 from ..errors import RigError
 from ..host_clock import REAL_CLOCK, HostClock
@@ -23,7 +23,6 @@ from ..safety.preflight import (
     program_check,
 )
 from .orders import Assignment
-from .ur import URArm, URReader
 
 REST_WATCH = 0.3  # s, for which the arm is watched at rest
 WAIT_FOR_OTHERS = 15.0  # s, for recorder and cameras to show signs of life
@@ -33,12 +32,14 @@ class Prepared(NamedTuple):
     """What the list said.
 
     Attributes:
-        arm: Connected, as far as that went: a `URArm` only if the session is armed.
+        reader: Of the arm; connected, as far as that went.
+        follower: The same arm, to be commanded; None unless the session is armed.
         checks: The list.
         states: Of the arm at rest; empty without a connection.
     """
 
-    arm: URReader
+    reader: ArmReader
+    follower: PathFollower | None
     checks: list[Check]
     states: list[ArmState]
 
@@ -62,7 +63,8 @@ def prepare(
         clock: Of this process.
     """
     rig, checks, states = to.rig, [], []
-    arm = URArm(rig, to.address, to.tool) if to.armed else URReader(to.address, rig.robot.rate)
+    follower = to.controller.follower(rig, to.tool) if to.armed else None
+    arm = to.controller.reader(rig) if follower is None else follower
     try:
         arm.connect()
         states.extend(_look(arm, 1.0 / rig.robot.rate, clock))
@@ -70,17 +72,17 @@ def prepare(
         checks.extend(_others(to, rows, clock))
         checks.append(disk_check(Path(to.directory)))
         checks.append(payload_check(arm.payload(), rig))
-        if not isinstance(arm, URArm):
+        if follower is None:
             checks.extend(mounted_checks(states[-1], None, rig, to.tool))
         elif not failures(checks):
-            states[:] = _take_control(arm, to, checks, clock)
+            states[:] = _take_control(follower, to, checks, clock)
             if failures(checks):
-                arm.give_up()
+                follower.give_up()
     except (RigError, LinkLost, ImportError, RuntimeError) as err:
         checks.append(Check("controller", False, str(err)))
-        if isinstance(arm, URArm):
-            arm.give_up()
-    return Prepared(arm, checks, states)
+        if follower is not None:
+            follower.give_up()
+    return Prepared(arm, follower, checks, states)
 
 
 def others(to: Assignment, board: Board) -> dict[Who, Row]:
@@ -90,7 +92,7 @@ def others(to: Assignment, board: Board) -> dict[Who, Row]:
 
 
 def _take_control(
-    arm: URArm, to: Assignment, checks: list[Check], clock: HostClock
+    arm: PathFollower, to: Assignment, checks: list[Check], clock: HostClock
 ) -> list[ArmState]:
     arm.take_control()
     states = _look(arm, 1.0 / to.rig.robot.rate, clock)
@@ -102,7 +104,7 @@ def _take_control(
     return states
 
 
-def _look(arm: URReader, period: float, clock: HostClock) -> list[ArmState]:
+def _look(arm: ArmReader, period: float, clock: HostClock) -> list[ArmState]:
     states = []
     end = clock.now() + REST_WATCH
     while clock.now() < end:

@@ -10,24 +10,16 @@ a process of its own owns the object.
 
 import sys
 from threading import Thread
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arm import (
-    ArmState,
-    LinkLost,
-    Payload,
-    Six,
-)
+from ..arm import LOOKAHEAD, WATCHDOG_PERIOD, ArmState, LinkLost, Payload, Six, Tool
 from ..errors import RigError, missing_extra
 from ..rig import Rig
-from ..safety.limits import TargetCheck, Tool
+from ..safety.limits import TargetCheck
 
-WATCHDOG_RATE = 10.0  # Hz: the controller stops its program 0.1 s after the last set-point
-# the defaults of the vendor's manual: the arm lags its set-points by about the first
-LOOKAHEAD = 0.1  # s
-SERVO_GAIN = 300.0
+SERVO_GAIN = 300.0  # 1/s2; like LOOKAHEAD the default of the vendor's manual
 STOP_DECELERATION = 3.0  # m/s2: from 0.15 m/s at rest within 0.05 s
 PROGRAM_ENDS = 1.0  # s, until the controller's program has ended
 # ur_rtde checks these two of servoL's arguments and the controller ignores them
@@ -123,7 +115,7 @@ class URReader:
             raise RigError(
                 f"no controller answers ({err})",
                 where=f"robot.host = {self._address}",
-                fix="switch it on, check the address, or start `bolfi-liquids rig emulate`",
+                fix="switch it on, or check the address",
             ) from err
 
 
@@ -183,7 +175,7 @@ class URArm(URReader):
         Raises:
             LinkLost: The controller did not take it.
         """
-        if not self._control.setWatchdog(WATCHDOG_RATE):
+        if not self._control.setWatchdog(1.0 / WATCHDOG_PERIOD):
             raise LinkLost("the controller did not take the watchdog")
         self._guarded = True
 
@@ -236,6 +228,20 @@ class URArm(URReader):
         if self._control is not None:
             self._lost = self._lost or not self._control.isConnected()
         return super()._connected()
+
+
+class URController(NamedTuple):
+    """The controller of a Universal Robots' arm, by its network address."""
+
+    address: str
+
+    def reader(self, rig: Rig) -> URReader:
+        """The arm to look at, not connected yet."""
+        return URReader(self.address, rig.robot.rate)
+
+    def follower(self, rig: Rig, tool: Tool) -> URArm:
+        """The arm to command with a tool in its gripper, not connected yet."""
+        return URArm(rig, self.address, tool)
 
 
 def _interface(module: str) -> Any:

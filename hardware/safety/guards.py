@@ -39,7 +39,7 @@ OUTCOME_TROUBLE = {
     Trouble.SOURCE_LOST: "gives no more pictures",
     Trouble.SAME_PICTURE: "gives the same picture again and again",
     Trouble.STOPPED: "has stopped",
-    Trouble.BAD_STAMPS: "gives stamps that are no times",
+    Trouble.BAD_STAMPS: "gives stamps that do not rise",
 }
 GUARD_MESSAGES = {
     "overrun": "this computer came late by",

@@ -4,10 +4,11 @@ A path that breaks a limit is refused as a whole; nothing is clipped.
 """
 
 from collections.abc import Generator
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from ..arm import Tool
 from ..errors import MotionRejected
 from ..motion.cup_frame import cup_frame
 from ..motion.kinematics import (
@@ -20,7 +21,6 @@ from ..motion.kinematics import (
 from ..motion.stir_paths import PosePath
 from ..rig import AxisLimits, Limits, Rig
 
-Tool = Literal["stirring", "pouring"]
 ARMS = {"cb3": UR10, "e-series": UR10E}
 MAX_TILT = {
     "stirring": np.radians(15.0),

@@ -19,13 +19,13 @@ from ..recorder.disk import Disk, told_if_fails
 from ..recorder.events import EventLog
 from ..recorder.names import frames_file, video_file
 from ..recorder.rate import Rate, counted, no_rate
-from ..recorder.stamps import StampWatch
+from ..recorder.stamps import stamp_fault
 from ..recorder.video import VideoWriter
 from ..recorder.views import stick_view
 from ..rig import Rig, View
 from ..signals import leave_signals_to_main
 from ..vision.frame import Frame
-from ..vision.frame_measurement import FrameMeasurement, line_is_good
+from ..vision.frame_measurement import Flag, FrameMeasurement, line_is_good
 from ..vision.measuring import FrameMeter
 
 SAME_PICTURES = 3  # in a row; a camera's noise makes no two alike
@@ -45,7 +45,7 @@ def run_camera(
 
     Pictures are read, measured and written one after the other. Where that falls behind, the
     driver's queue holds some and drops others: a camera that counts them leaves their `index`
-    out, and of a webcam, which does not, the stamps tell. The sign of life is given at each
+    out, and the stamps tell of others. The sign of life is given at each
     picture that differs from the one before, so that a camera that hangs, and one that repeats
     itself, look dead.
 
@@ -91,26 +91,24 @@ class _Tally(NamedTuple):
     rate: Rate
     last: int = -1  # index of the last picture
     lost: int = 0
-    image: np.ndarray | None = None
     same: int = 1  # times that the last picture has come in a row
     beat: float = 0.0  # when the last new one came
     worst: float = 0.0  # longest time between new ones
     angle: float = float("nan")
 
 
-def tallied(tally: _Tally, frame: Frame, angle: float, now: float) -> _Tally:
+def tallied(tally: _Tally, row: FrameMeasurement, now: float) -> _Tally:
     """What is remembered after another picture, which came at `now` [s]."""
-    new = tally.image is None or not np.array_equal(frame.image, tally.image)
+    new = not row.flags & Flag.REPEATED_IMAGE
     between = now - tally.beat if new and tally.beat else 0.0
     return tally._replace(
         rate=counted(tally.rate, 1, now),
-        last=frame.index,
-        lost=tally.lost + max(frame.index - tally.last - 1, 0),
-        image=frame.image,
+        last=row.index,
+        lost=tally.lost + max(row.index - tally.last - 1, 0),
         same=1 if new else tally.same + 1,
         beat=now if new else tally.beat,
         worst=max(tally.worst, between),
-        angle=angle,
+        angle=row.angle if line_is_good(row.flags) else float("nan"),
     )
 
 
@@ -121,8 +119,7 @@ class _CameraProcess:
         self._disk = disk
         self._trouble = Trouble.NONE
         self._tally = _Tally(no_rate(host_time()))
-        # a file is read faster than it was recorded
-        self._stamps = StampWatch() if rig.camera(view).is_device else None
+        self._stamps: tuple[float, float] | None = None  # the first and the latest [s]
         self._meter = FrameMeter(stick_view(rig, view))
         self._table: CsvAppender | None = None
         self._video: VideoWriter | None = None
@@ -137,7 +134,7 @@ class _CameraProcess:
                     if frame is None:
                         self._lose("it gives no more pictures")
                         break
-                    self._take(frame)
+                    self._take(frame, host_time())
         except (CameraError, ValueError, OSError) as err:
             self._lose(str(err))
         leaving.wait()
@@ -163,26 +160,23 @@ class _CameraProcess:
         path = directory / video_file(self._view)
         self._video = VideoWriter(path, size=size, rate=camera.rate)
 
-    def _take(self, frame: Frame) -> None:
+    def _take(self, frame: Frame, came: float) -> None:
         row = self._meter.measure(frame)
         self._keep(frame, row)
-        seen = row.angle if line_is_good(row.flags) else float("nan")
-        self._tally = tallied(self._tally, frame, seen, frame.host)
         self._watch_stamp(frame)
+        self._tally = tallied(self._tally, row, came)
         if self._tally.same == SAME_PICTURES:
             reason = f"the same picture came {SAME_PICTURES} times in a row"
-            self._complain(Trouble.SAME_PICTURE, "same_picture", reason=reason, index=frame.index)
+            self._complain(Trouble.SAME_PICTURE, reason=reason, index=frame.index)
         self._beat()
 
     def _watch_stamp(self, frame: Frame) -> None:
-        """Complain once of a camera's clock that is lost: what follows could not be used."""
-        watch = self._stamps
-        if watch is None or watch.fault is not None:
-            return
-        watch.take(frame.index, frame.stamp, frame.host)
-        if watch.fault is not None:
-            index, reason = watch.fault.index, str(watch.fault)
-            self._complain(Trouble.BAD_STAMPS, "bad_stamps", reason=reason, index=index)
+        """Complain of the first stamp that does not rise; long steps trip the guard of its age."""
+        first, before = self._stamps or (frame.stamp, -np.inf)
+        self._stamps = first, frame.stamp
+        if not frame.stamp > before and self._trouble is Trouble.NONE:
+            reason = stamp_fault(frame.stamp - before, frame.index, before - first)
+            self._complain(Trouble.BAD_STAMPS, reason=reason, index=frame.index)
 
     def _keep(self, frame: Frame, row: FrameMeasurement) -> None:
         table, video = self._table, self._video
@@ -192,13 +186,13 @@ class _CameraProcess:
             self._disk.write(video_file(self._view), partial(video.write, frame.image, frame.stamp))
 
     def _lose(self, reason: str) -> None:
-        self._complain(Trouble.SOURCE_LOST, "source_lost", reason=reason)
+        self._complain(Trouble.SOURCE_LOST, reason=reason)
         self._beat()
 
-    def _complain(self, trouble: Trouble, kind: str, **fields: float | str) -> None:
+    def _complain(self, trouble: Trouble, **fields: float | str) -> None:
         # it stays on the board: nothing that stopped an arm resumes by itself
         self._trouble = trouble
-        self._disk.tell(kind, **fields)
+        self._disk.tell(trouble.kind, **fields)
 
     def _beat(self) -> None:
         tally = self._tally

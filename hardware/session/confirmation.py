@@ -1,37 +1,33 @@
 """An operator's leave to move the arm, which nothing but a typed sentence gives (S1)."""
 
 from collections.abc import Sequence
-from ipaddress import ip_address
 
 import numpy as np
 
-from ..emulator.admin_client import Admin, AdminError
+from ..arm import Tool
 from ..errors import RigError
 from ..motion.stir_paths import PosePath
 from ..rig import Rig
-from ..safety.limits import Tool, workspace
+from ..safety.limits import workspace
 
 CONFIRMATION = "the arm may move"
-ANSWER_SECONDS = 2.0  # s
 _KEY = object()
 
 
 class Confirmation:
-    """That a plan was read and allowed for one session; made by the functions below alone.
+    """That a plan was read and allowed for one session; made by `confirm` alone.
 
     Attributes:
         plan: What was read.
         address: The controller's that it is good for.
-        emulated: Whether that is an emulator.
         used: Whether a session has taken it.
     """
 
-    def __init__(self, key: object, plan: str, address: str, *, emulated: bool):
+    def __init__(self, key: object, plan: str, address: str):
         if key is not _KEY:
             raise TypeError("a Confirmation comes from confirm(plan, typed, address) only")
         self.plan = plan
         self.address = address
-        self.emulated = emulated
         self.used = False
 
 
@@ -52,40 +48,7 @@ def confirm(plan: str, typed: str, address: str) -> Confirmation:
             where="confirmation",
             fix=f"type exactly: {CONFIRMATION}",
         )
-    return Confirmation(_KEY, plan, address, emulated=False)
-
-
-def confirm_emulated(plan: str, address: str) -> Confirmation:
-    """Leave to move an emulated arm, which nobody has to type.
-
-    A forwarded port on this computer may lead to a real arm: so the address must be a loopback
-    one, and an emulator must answer on its own admin port, which no controller has.
-
-    Raises:
-        RigError: There is no emulator at the address.
-    """
-    if not (_is_loopback(address) and _answers_as_emulator(address)):
-        raise RigError(
-            f"no emulator answers at {address}",
-            where="robot.host",
-            fix="a real arm moves only after a typed confirmation",
-        )
-    return Confirmation(_KEY, plan, address, emulated=True)
-
-
-def _is_loopback(address: str) -> bool:
-    try:
-        return ip_address(address).is_loopback
-    except ValueError:
-        return False
-
-
-def _answers_as_emulator(address: str) -> bool:
-    try:
-        Admin(address, timeout=ANSWER_SECONDS).state()
-    except (OSError, AdminError):
-        return False
-    return True
+    return Confirmation(_KEY, plan, address)
 
 
 def describe(paths: Sequence[PosePath], rig: Rig, tool: Tool) -> str:

@@ -1,6 +1,6 @@
 """What an operator sees while the arm moves."""
 
-from typing import NamedTuple
+from collections.abc import Mapping
 
 import numpy as np
 from rich.progress_bar import ProgressBar
@@ -9,6 +9,7 @@ from rich.text import Text
 
 from ..board import Row, Trouble, Who
 from ..safety.guards import OUTCOME_TROUBLE, Reading
+from .progress import Status
 
 BAR_WIDTH = 30
 LITTLE_MARGIN = 0.2  # of a guard's limit: less margin is shown in yellow
@@ -22,37 +23,25 @@ NAMES = {
 COUNTED_UNITS = {Who.CONTROL: "ticks", Who.RECORDER: "rows"}
 
 
-class LiveStatus(NamedTuple):
-    """What the view shows.
+def live_table(title: str, status: Status, now: float) -> Table:
+    """The view as a table that fits into 80 columns.
 
-    Attributes:
-        title: What is going on, such as "dry run: star, cycle 1 of 3".
+    Args:
+        title: What is going on, such as "stirring, motion 1 of 30".
+        status: Of the session.
         now: Host time [s].
-        rows: The board's rows, in the order of `Who`.
-        guards: The latest readings.
-        message: Why the arm stopped; empty while it moves.
     """
-
-    title: str
-    now: float
-    rows: tuple[Row, ...]
-    guards: tuple[Reading, ...] = ()
-    message: str = ""
-
-
-def live_table(status: LiveStatus) -> Table:
-    """The view as a table that fits into 80 columns."""
     table = Table.grid(padding=(0, 2))
-    table.title = status.title
+    table.title = title
     table.add_row("path", _progress(status.rows[Who.CONTROL].value))
     table.add_row("stick", _inclination(status.rows))
     table.add_row("loop", f"at most {1e3 * status.rows[Who.CONTROL].worst:.1f} ms late")
     for who in Who:
-        table.add_row(NAMES[who], _alive(who, status.rows[who], status.now))
-    for guard in filter(lambda one: one.unit, status.guards):  # the others are yes or no
+        table.add_row(NAMES[who], _alive(who, status.rows[who], now))
+    for guard in filter(lambda one: one.unit, status.readings):  # the others are yes or no
         table.add_row(guard.name, _guard(guard))
-    if status.message:
-        table.add_row("stopped", Text(status.message, style="bold red"))
+    if status.stopped is not None:
+        table.add_row("stopped", Text(status.stopped.reason, style="bold red"))
     return table
 
 
@@ -63,7 +52,7 @@ def _progress(share: float) -> Table:
     return line
 
 
-def _inclination(rows: tuple[Row, ...]) -> str:
+def _inclination(rows: Mapping[Who, Row]) -> str:
     return "   ".join(
         f"{plane} {_degrees(rows[who].value)}"
         for plane, who in (("xz", Who.CAMERA_XZ), ("yz", Who.CAMERA_YZ))

@@ -16,7 +16,6 @@ from ..motion.stir_paths import PosePath
 from ..recorder.directory import discard_directory, start_directory
 from ..recorder.events import EventLog, drop_reserve, read_events
 from ..recorder.outcome import detailed
-from ..rig_file import checked_rig
 from ..robot.orders import Ask, Follow, Leave, Stop, Stopped
 from ..safety.limits import check_path
 from ..safety.preflight import Check, failures
@@ -57,7 +56,7 @@ class Session:
     def __init__(self, setup: SessionSetup):
         check_can_start()
         self.setup = setup
-        self.rig = setup.guarded_rig()
+        self.rig = setup.guarded_rig
         self.directory = Path(setup.directory)
         self.board = Board()
         self._frame = cup_frame(self.rig.cup)
@@ -115,11 +114,11 @@ class Session:
         setup.take_confirmation()
         extra = {"source": setup.source, "tool": setup.tool, "rehearsal": setup.rehearsal}
         videos = bool(setup.make_cameras)
-        rig = checked_rig(setup.rig)  # not the guards', whose limits a rehearsal widens
-        start_directory(self.directory, rig, extra, duration=setup.duration, videos=videos)
+        # the rig itself, not the guards', whose limits a rehearsal widens
+        start_directory(self.directory, setup.rig, extra, duration=setup.duration, videos=videos)
         log = EventLog(self.directory, "main")
         plan = "" if setup.confirmation is None else setup.confirmation.plan
-        log.write("session", armed=setup.armed, address=setup.controller, plan=plan)
+        log.write("session", armed=setup.armed, address=setup.controller.address, plan=plan)
         return log
 
     def preflight(self) -> list[Check]:

@@ -2,20 +2,23 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from ..arm import Controller, Tool
 from ..cameras.base import FrameSource
+from ..emulated.arm import EmulatedController
+from ..emulated.rig import patient
 from ..errors import RigError
 from ..motion.cup_frame import cup_frame
 from ..motion.stir_paths import PosePath
 from ..rig import Rig, View
 from ..rig_file import checked_rig
 from ..robot.orders import Assignment
-from ..safety.limits import Tool
+from ..robot.ur import URController
 from .confirmation import Confirmation
-from .emulated_limits import patient
 
 PROBED_POSES = 60  # poses of the plan about which the controller's own limits are asked
 
@@ -27,45 +30,49 @@ class SessionSetup:
     Attributes:
         rig: What is there.
         directory: Of the recording; new or empty.
-        address: Of the controller; the rig's own if None.
+        arm: Opens the arm; the controller that the rig names if None.
         make_cameras: By view, what opens its camera in the process that reads it; both or none.
         tool: What is in the gripper.
         armed: Whether the arm may move.
-        confirmation: What a person has typed after reading the plan; needed if armed.
+        confirmation: What a person has typed after reading the plan; needed if armed, unless the
+            arm is emulated.
         plan: What will be followed; the controller's own safety limits are asked about it.
-        rehearsal: Whether stalls of this computer are borne, as `patient` says; for an emulated
-            arm only.
         source: Where the data come from, for the recording.
 
     Raises:
-        RigError: Armed without a confirmation for this controller, or a rehearsal without an
-            emulated arm.
+        RigError: A real arm is armed without a confirmation for its controller.
     """
 
     rig: Rig
     directory: Path
-    address: str | None = None
+    arm: Controller | None = None
     make_cameras: Mapping[View, Callable[[], FrameSource]] = field(default_factory=dict)
     tool: Tool = "stirring"
     armed: bool = False
     confirmation: Confirmation | None = None
     plan: Sequence[PosePath] = field(default=(), repr=False)
-    rehearsal: bool = False
     source: str = "robot"
 
     def __post_init__(self) -> None:
         self._check_permission()
 
     @property
-    def controller(self) -> str:
-        """Address of the controller."""
-        return self.rig.robot.host if self.address is None else self.address
+    def controller(self) -> Controller:
+        """What opens the arm."""
+        return URController(self.rig.robot.host) if self.arm is None else self.arm
+
+    @property
+    def rehearsal(self) -> bool:
+        """Whether the arm is emulated: nobody is asked, and guards bear stalls of this computer."""
+        # no other controller may say so of itself: this is what spares the confirmation
+        return isinstance(self.arm, EmulatedController)
 
     @property
     def duration(self) -> float:
         """Of the plan [s]."""
         return sum(path.duration for path in self.plan)
 
+    @cached_property
     def guarded_rig(self) -> Rig:
         """The rig by whose limits the arm is guarded; wider ones in a rehearsal.
 
@@ -78,8 +85,8 @@ class SessionSetup:
     def assignment(self) -> Assignment:
         """What the control process is for."""
         return Assignment(
-            rig=self.guarded_rig(),
-            address=self.controller,
+            rig=self.guarded_rig,
+            controller=self.controller,
             tool=self.tool,
             armed=self.armed,
             directory=str(self.directory),
@@ -98,14 +105,8 @@ class SessionSetup:
             self.confirmation.used = True
 
     def _check_permission(self) -> None:
-        if self.armed:
-            _check_confirmation(self.confirmation, self.controller)
-        if self.rehearsal and (self.confirmation is None or not self.confirmation.emulated):
-            raise RigError(
-                "a rehearsal without an emulated arm",
-                where="SessionSetup(rehearsal=True)",
-                fix="pass confirm_emulated(plan, address), or leave rehearsal out",
-            )
+        if self.armed and not self.rehearsal:
+            _check_confirmation(self.confirmation, self.controller.address)
 
 
 def _check_confirmation(confirmation: Confirmation | None, address: str) -> None:

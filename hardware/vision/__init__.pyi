@@ -14,7 +14,6 @@ from .frame import Frame as Frame
 from .frame_measurement import Flag as Flag
 from .frame_measurement import FrameMeasurement as FrameMeasurement
 from .frame_measurement import line_is_good as line_is_good
-from .frame_measurement import marker_is_good as marker_is_good
 from .inclination import Inclination as Inclination
 from .inclination import ViewLines as ViewLines
 from .inclination import direction as direction
@@ -23,7 +22,7 @@ from .joined_views import JoinedInclination as JoinedInclination
 from .joined_views import MeasuredView as MeasuredView
 from .joined_views import join as join
 from .measurement_series import FrameSeries as FrameSeries
-from .measurement_series import as_series as as_series
+from .measurement_series import frame_series as frame_series
 from .measurement_series import interpolate_lines as interpolate_lines
 from .measuring import FrameMeter as FrameMeter
 from .measuring import Track as Track
@@ -31,8 +30,4 @@ from .measuring import measure as measure
 from .plumb_line import Levelled as Levelled
 from .plumb_line import PlumbLineError as PlumbLineError
 from .plumb_line import level_camera as level_camera
-from .pose_refinement import PoseError as PoseError
-from .pose_refinement import RefinedPose as RefinedPose
-from .pose_refinement import refine_orientation as refine_orientation
 from .stick_view import StickView as StickView
-from .stick_view import ViewError as ViewError

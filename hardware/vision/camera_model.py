@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -117,16 +117,6 @@ class CameraModel:
     def depth(self, point: np.ndarray) -> float:
         """Distance of a point of the cup frame along the line of sight [m]."""
         return float(self.rotation[2] @ (np.asarray(point) - self.position))
-
-    def turned(self, rotation_vector: np.ndarray, shift: np.ndarray) -> "CameraModel":
-        """The camera turned about its own axes [rad] and moved in the cup frame [m]."""
-        from scipy.spatial.transform import Rotation
-
-        return replace(
-            self,
-            rotation=Rotation.from_rotvec(-np.asarray(rotation_vector)).as_matrix() @ self.rotation,
-            position=self.position + shift,
-        )
 
 
 def look_at(position: np.ndarray, target: np.ndarray, roll: float = 0.0) -> np.ndarray:

@@ -1,4 +1,8 @@
-"""A camera's clock against the robot's, from where the marker is in the pictures."""
+"""From a camera's stamps to the robot's clock, by where the marker is in the pictures.
+
+A stamp is this computer's time when a picture was grabbed: later than the exposure by the camera's
+delay, on a clock that the controller's differs from by a constant and by a slow drift.
+"""
 
 from typing import NamedTuple
 
@@ -30,8 +34,8 @@ class Clock(NamedTuple):
     """Robot's time = stamp + offset + drift * (stamp - reference).
 
     Attributes:
-        offset: [s].
-        drift: Robot's clock runs so much faster than the camera's.
+        offset: [s]; the difference of the clocks less the camera's delay.
+        drift: The robot's clock runs so much faster than this computer's.
         reference: Stamp at which `offset` holds [s].
         offset_error: Standard error [s].
         drift_error: Standard error.
@@ -51,11 +55,11 @@ class Clock(NamedTuple):
     misfit: float = float("nan")
 
     def to_robot(self, stamp: np.ndarray) -> np.ndarray:
-        """Times of the robot's clock [s] of stamps of the camera's."""
+        """Times of the robot's clock [s] of stamps [s]."""
         return stamp + self.offset + self.drift * (stamp - self.reference)
 
     def to_camera(self, time: np.ndarray) -> np.ndarray:
-        """Stamps of the camera's clock [s] of times of the robot's."""
+        """Stamps [s] of times of the robot's clock [s]."""
         elapsed = (time - self.reference - self.offset) / (1.0 + self.drift)
         return self.reference + elapsed
 
@@ -68,7 +72,7 @@ def fit_clock(
     *,
     guess: float,
 ) -> Clock:
-    """Offset and drift between a camera's clock and the robot's.
+    """Offset and drift from a camera's stamps to the robot's clock.
 
     The marker's pixels are regressed on the projected path of the gripper, by Gauss-Newton with
     Huber's weights. A constant and a linear function of the gripper's position are fitted along:
@@ -80,8 +84,8 @@ def fit_clock(
         gripper: The robot's samples; times without finite position are skipped.
         camera: Of the view.
         marker_offset: From the pivot to the marker [m].
-        guess: Robot's time minus stamp [s], right to `SEARCH_RANGE`; the median difference of what
-            arrived at the same time will do.
+        guess: Robot's time minus stamp [s], right to `SEARCH_RANGE`; the median difference of the
+            robot's time and this computer's in its samples will do.
 
     Raises:
         ClockError: too few frames show the marker while the robot was sampled, or the gripper
@@ -97,7 +101,8 @@ def fit_clock(
         fit = _linear_fit(state, stamp - reference, stamp, pixels, path)
         state = state + fit.step
         if np.abs(fit.step[0]) < STEP_TOLERANCE:
-            return _as_clock(state, reference, fit)
+            errors = np.sqrt(np.diag(fit.covariance))
+            return Clock(*state.tolist(), reference, *errors.tolist(), fit.residual, fit.misfit)
     raise ClockError(
         f"the clocks did not settle in {MAX_ROUNDS} rounds: is the marker's offset right, and does "
         "the robot's time advance evenly?"
@@ -111,18 +116,6 @@ class _ClockStep(NamedTuple):
     covariance: np.ndarray
     residual: float
     misfit: float
-
-
-def _as_clock(state: np.ndarray, reference: float, fit: _ClockStep) -> Clock:
-    return Clock(
-        offset=float(state[0]),
-        drift=float(state[1]),
-        reference=reference,
-        offset_error=float(np.sqrt(fit.covariance[0, 0])),
-        drift_error=float(np.sqrt(fit.covariance[1, 1])),
-        residual=fit.residual,
-        misfit=fit.misfit,
-    )
 
 
 class _Path(NamedTuple):

@@ -10,12 +10,11 @@ class Frame(NamedTuple):
 
     Attributes:
         index: Counts the camera's frames from 0; a number that is left out is a lost frame.
-        stamp: Time of the exposure on the camera's own clock [s].
-        host: Time of arrival on this computer's clock, `time.monotonic()` [s].
+        stamp: When a camera gave it, on this computer's clock, `time.monotonic()` [s]; of a file,
+            its own time.
         image: Grey levels, uint8, shape (height, width).
     """
 
     index: int  # pyright: ignore[reportIncompatibleMethodOverride]
     stamp: float
-    host: float
     image: np.ndarray

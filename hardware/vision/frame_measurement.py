@@ -21,7 +21,6 @@ class Flag(IntFlag):
 
 
 MARKER_ONLY = Flag.NO_MARKER
-BAD_MARKER = Flag.NO_MARKER | Flag.REPEATED_IMAGE
 BAD_LINE = ~MARKER_ONLY
 
 
@@ -30,8 +29,7 @@ class FrameMeasurement(NamedTuple):
 
     Attributes:
         index: Of the frame.
-        stamp: On the camera's clock [s].
-        host: Of arrival, on this computer's clock [s].
+        stamp: When the camera gave it, on this computer's clock [s].
         marker_column, marker_row: Centre of the marker [px], NaN when it was not found.
         angle: Of the stick's line in undistorted coordinates, from the picture's downward
             vertical, positive to the right [rad]; NaN when there is none.
@@ -45,7 +43,6 @@ class FrameMeasurement(NamedTuple):
 
     index: int  # pyright: ignore[reportIncompatibleMethodOverride]
     stamp: float
-    host: float
     marker_column: float
     marker_row: float
     angle: float
@@ -60,8 +57,3 @@ class FrameMeasurement(NamedTuple):
 def line_is_good(flags: int) -> bool:
     """Whether the line of a frame with these flags may be used."""
     return not flags & BAD_LINE
-
-
-def marker_is_good(flags: int) -> bool:
-    """Whether the marker of a frame with these flags may be used."""
-    return not flags & BAD_MARKER

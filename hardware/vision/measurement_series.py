@@ -1,11 +1,11 @@
 """A camera's measurements over time, and their values between the frames."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from .frame_measurement import BAD_LINE, Flag, FrameMeasurement
+from .frame_measurement import BAD_LINE, Flag
 from .inclination import ViewLines
 
 LONGEST_GAP = 0.1  # s between the good frames on both sides
@@ -16,7 +16,7 @@ class FrameSeries(NamedTuple):
     """Measurements of one view; all of shape (N,), one row a frame.
 
     Attributes:
-        stamp: On the camera's clock [s].
+        stamp: When the camera gave it, on this computer's clock [s].
         marker: Column and row of the marker [px], shape (N, 2), NaN where it is hidden.
         lines: The stick's line.
         flags: `Flag` as numbers.
@@ -40,23 +40,18 @@ class Interpolated(NamedTuple):
     flags: np.ndarray
 
 
-def as_series(frames: Sequence[FrameMeasurement]) -> FrameSeries:
-    """Measurements as columns, in the order of their stamps."""
-    frames = sorted(frames, key=lambda frame: frame.stamp)
-
-    def column(name: str) -> np.ndarray:
-        return np.array([getattr(frame, name) for frame in frames], dtype=float)
-
+def frame_series(columns: Mapping[str, np.ndarray]) -> FrameSeries:
+    """Columns of `FrameMeasurement` as a series; stamps rise."""
     return FrameSeries(
-        stamp=column("stamp"),
-        marker=np.column_stack([column("marker_column"), column("marker_row")]),
-        lines=ViewLines(*(column(name) for name in ViewLines._fields)),
-        flags=np.array([frame.flags for frame in frames], dtype=np.int64),
+        stamp=columns["stamp"],
+        marker=np.column_stack([columns["marker_column"], columns["marker_row"]]),
+        lines=ViewLines(*(columns[name] for name in ViewLines._fields)),
+        flags=columns["flags"].astype(np.int64),
     )
 
 
 def interpolate_lines(series: FrameSeries, stamps: np.ndarray) -> Interpolated:
-    """Lines at other times of the camera's clock, by cubics through the nearest good frames.
+    """Lines at other times, by cubics through the nearest good frames.
 
     Frames whose line is doubtful are passed over. There are two neighbours on each side, one
     where the second is more than `LONGEST_GAP` away, and none across a longer gap.

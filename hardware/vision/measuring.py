@@ -27,7 +27,6 @@ SATURATED_SHARE = 0.10
 # length, found with a cluttered background, is nothing that the scatter of the rows shows.
 SYSTEMATIC_ERROR = 0.025  # px
 HIDDEN_SEARCH = 40.0  # px on both sides of where the marker was
-COMPARED_PIXELS = (slice(None, None, 7), slice(None, None, 5))
 
 
 class Track(NamedTuple):
@@ -37,13 +36,13 @@ class Track(NamedTuple):
         pivot: Column and row [px], None before the first marker.
         angle: Of the last good line [rad], NaN before the first.
         stamp: Of the last good line [s].
-        sample: Some pixels of the last picture, to see it again.
+        image: The last picture, to see it again.
     """
 
     pivot: tuple[float, float] | None = None
     angle: float = float("nan")
     stamp: float = float("nan")
-    sample: np.ndarray | None = None
+    image: np.ndarray | None = None
 
 
 class _Stick(NamedTuple):
@@ -74,12 +73,11 @@ def measure(frame: Frame, view: StickView, track: Track) -> tuple[FrameMeasureme
             f"frame {frame.index} is {image.dtype} of shape {image.shape}; the camera model is "
             f"for grey uint8 of shape {view.camera.size[::-1]}: calibrate at the size you record"
         )
-    sample = image[COMPARED_PIXELS].copy()
     marker = find_marker(image, view.marker_radius * view.scale)
     pivot = _pivot(marker, view) if marker is not None else track.pivot
     stick = _find_stick(image, view, pivot, known=marker is not None)
     flags = stick.flags | (Flag(0) if marker is not None else Flag.NO_MARKER)
-    if track.sample is not None and np.array_equal(sample, track.sample):
+    if track.image is not None and np.array_equal(image, track.image):
         flags |= Flag.REPEATED_IMAGE
     angle = float(np.arctan(stick.line.slope)) if stick.line is not None else float("nan")
     if _jumps(angle, frame.stamp, track):
@@ -90,7 +88,7 @@ def measure(frame: Frame, view: StickView, track: Track) -> tuple[FrameMeasureme
         pivot=pivot,
         angle=angle if good else track.angle,
         stamp=frame.stamp if good else track.stamp,
-        sample=sample,
+        image=image,
     )
 
 
@@ -228,7 +226,6 @@ def _as_measurement(
     return FrameMeasurement(
         index=frame.index,
         stamp=frame.stamp,
-        host=frame.host,
         marker_column=marker.column if marker is not None else nan,
         marker_row=marker.row if marker is not None else nan,
         angle=float(np.arctan(slope)),

@@ -10,6 +10,7 @@ from .coarse_search import Ray, Rows, sampled_rows, search_rays
 from .opencv import opencv
 from .stick_line import Line, fit_line
 
+DARK = -1.0  # sign of the thread's contrast
 LEAST_RESPONSE = 8.0  # grey levels
 START_STEP = 3.0  # px
 SEARCH_WIDTH = 9  # px
@@ -37,17 +38,14 @@ class Levelled(NamedTuple):
     error: float
 
 
-def level_camera(
-    image: np.ndarray, camera: CameraModel, *, width: float = 4.0, bright: bool = False
-) -> Levelled:
+def level_camera(image: np.ndarray, camera: CameraModel, *, width: float = 4.0) -> Levelled:
     """Roll a camera about its line of sight so that a plumb line is vertical.
 
     Args:
         image: Grey levels, uint8; a thread hangs through most of its height, in front of an even
-            background.
+            background that is brighter.
         camera: Whose pitch and yaw are right or nearly so.
         width: Of the thread [px], about.
-        bright: Whether the thread is brighter than what is behind it.
 
     Raises:
         PlumbLineError: there is no thread, or too little of it.
@@ -58,7 +56,7 @@ def level_camera(
         raise PlumbLineError(
             f"the picture has shape {image.shape}, the camera model {camera.size[::-1]}"
         )
-    line = _thread(image, camera, width, 1.0 if bright else -1.0)
+    line = _thread(image, camera, width)
     roll = -_correction(line, camera)
     turned = replace(camera, rotation=Rotation.from_euler("z", -roll).as_matrix() @ camera.rotation)
     return Levelled(turned, roll, line.slope_error / (1.0 + line.slope**2))
@@ -83,12 +81,12 @@ def _correction(line: Line, camera: CameraModel) -> float:
     return float(roots[np.argmin(np.abs(roots))])
 
 
-def _thread(image: np.ndarray, camera: CameraModel, width: float, sign: float) -> Line:
+def _thread(image: np.ndarray, camera: CameraModel, width: float) -> Line:
     rows = Rows(0, image.shape[0])
     starts = np.arange(0.0, image.shape[1], START_STEP)
     # blurred to a width that the rays cannot step over
     smooth = opencv().blur(image, (SEARCH_WIDTH, 3))
-    lines, middle = sampled_rows(smooth, sign, rows), 0.5 * image.shape[0]
+    lines, middle = sampled_rows(smooth, DARK, rows), 0.5 * image.shape[0]
     far = 2.0 * image.shape[0]
     ray = search_rays(lines, starts, middle, rows, width=SEARCH_WIDTH, length=far)
     if ray.response < LEAST_RESPONSE:
@@ -96,7 +94,7 @@ def _thread(image: np.ndarray, camera: CameraModel, width: float, sign: float) -
             "no plumb line was found: hang a thread, dark before a bright background, through "
             "the whole picture"
         )
-    points = _centroids(image, sign, ray, width)
+    points = _centroids(image, ray, width)
     line = fit_line(camera.undistort(points)) if len(points) else None
     count = 0 if line is None else int(line.inlier.sum())
     if line is None or count < LEAST_SHARE * image.shape[0] or line.slope_error > MOST_ERROR:
@@ -107,7 +105,7 @@ def _thread(image: np.ndarray, camera: CameraModel, width: float, sign: float) -
     return line
 
 
-def _centroids(image: np.ndarray, sign: float, ray: Ray, width: float) -> np.ndarray:
+def _centroids(image: np.ndarray, ray: Ray, width: float) -> np.ndarray:
     """Middle of the thread in each row [px], shape (N, 2), where it stands out."""
     row = np.arange(image.shape[0])
     reach = int(np.ceil(0.5 * width + FLANK_WIDTH))
@@ -115,7 +113,7 @@ def _centroids(image: np.ndarray, sign: float, ray: Ray, width: float) -> np.nda
     inside = (centre >= reach) & (centre < image.shape[1] - reach)
     row, centre = row[inside], centre[inside]
     offsets = np.arange(-reach, reach + 1)
-    strength = sign * image[row[:, None], centre[:, None] + offsets].astype(np.float64)
+    strength = DARK * image[row[:, None], centre[:, None] + offsets].astype(np.float64)
     flank = np.abs(offsets) > reach - FLANK_WIDTH // 2
     level, scatter = strength[:, flank].mean(axis=1), strength[:, flank].std(axis=1)
     above = np.maximum(strength - level[:, None] - 2.0 * np.median(scatter), 0.0)

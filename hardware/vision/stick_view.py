@@ -6,13 +6,9 @@ from typing import Literal
 
 import numpy as np
 
-from .camera_model import CameraModel
+from .camera_model import CameraModel, CameraModelError
 
 SURFACE_MARGIN = 0.003  # the liquid climbs the stick, and waves
-
-
-class ViewError(ValueError):
-    """A view's sizes do not make sense; the message names the size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +25,6 @@ class StickView:
         cup_radius: Of the surface.
         gripper_below: The gripper hides this length of the stick below the pivot.
         contrast: Whether the stick is darker or brighter than what is behind it.
-
-    Raises:
-        ViewError: a size is not finite, or one that must be positive is not.
     """
 
     camera: CameraModel
@@ -44,17 +37,6 @@ class StickView:
     gripper_below: float = 0.01
     contrast: Literal["dark", "bright"] = "dark"
 
-    def __post_init__(self) -> None:
-        for name in ("stick_radius", "stick_length", "marker_radius", "cup_radius"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise ViewError(f"{name} must be positive and finite [m], got {value}")
-        for name in ("marker_offset", "surface_height", "gripper_below"):
-            if not np.isfinite(getattr(self, name)).all():
-                raise ViewError(f"{name} must be finite [m], got {getattr(self, name)}")
-        if self.contrast not in ("dark", "bright"):
-            raise ViewError(f"contrast must be 'dark' or 'bright', got {self.contrast!r}")
-
     @cached_property
     def last_row(self) -> float:
         """Row [px] above which everything is seen above the surface, wherever the stick is."""
@@ -63,7 +45,7 @@ class StickView:
         height = np.full((48, 1), self.surface_height + SURFACE_MARGIN)
         rows = self.camera.project(np.hstack([rim, height]))[:, 1]
         if not np.isfinite(rows).all():
-            raise ViewError(
+            raise CameraModelError(
                 f"the surface at {self.surface_height} m is behind the camera at "
                 f"{self.camera.position.tolist()}; check position and orientation"
             )

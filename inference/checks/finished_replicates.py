@@ -72,7 +72,7 @@ class Replicates:
     @property
     def errors(self) -> dict[int, str]:
         """Number -> error of the failed replicates."""
-        return {r.number: str(r.error) for r in self.failed}
+        return {r.number: f"{r.stage}: {r.error}" for r in self.failed}
 
     def values(self, quantities: Mapping[str, Quantity] | None = None) -> Values:
         """Parameters and further quantities at truths and draws.
@@ -125,7 +125,7 @@ class Replicates:
         if len(self.failed) > tolerated:
             said.append(
                 f"{len(self.failed)} of {len(self) + len(self.failed)} replicates failed, enough "
-                f"to hide a fault; the first: {self.failed[0].error}"
+                f"to hide a fault; the first: {next(iter(self.errors.values()))}"
             )
         short = int(np.sum(self.count < self.most)) if self.finished else 0
         if short > tolerated:

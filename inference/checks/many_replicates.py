@@ -22,7 +22,7 @@ from ..describe import describe
 from ..prior import Prior, checked_prior
 from ..progress import progress_bar
 from ..simulations.executors import Workers, check_executor, open_executor
-from ..simulations.failures import Failure, kind, unusable
+from ..simulations.failures import FailureKind
 from ..simulations.job import BATCH
 from ..types import Simulator
 from .finished_replicates import Replicates
@@ -197,11 +197,12 @@ def _unless_all_are_misshapen(made: Iterator[Replicate], first: int) -> Iterator
     """
     waiting: list[Replicate] | None = []
     for replicate in made:
-        stage, _, why = (replicate.error or "").partition(": ")
-        if waiting is not None and kind(why) is Failure.UNUSABLE:
+        failure = replicate.error
+        misshapen = failure is not None and failure.kind is FailureKind.UNUSABLE
+        if failure is not None and waiting is not None and misshapen:
             waiting.append(replicate)
             if len(waiting) == first:
-                raise ValueError(f"{stage}: {why.removeprefix(unusable(''))}")
+                raise ValueError(f"{replicate.stage}: {failure.text}")
             continue
         yield from waiting or ()
         waiting = None

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ..arguments import Unusable, float64
-from ..simulations.failures import timed_out, unusable
+from ..simulations.failures import Failure, not_finite, raised, timed_out, unusable
 from ..simulations.job import Job, Overdue, limit_of, misshapen, within
 from ..simulations.returned import signals_of
 from ..types import Simulator
@@ -49,7 +49,7 @@ class ReplicatePlan(NamedTuple):
 
 
 class Replicate(NamedTuple):
-    """One replicate, finished or failed; `error` says why, and at which of the two stages."""
+    """One replicate, finished or failed; `error` says why, and `stage` where."""
 
     number: int
     truth: np.ndarray  # [d]
@@ -58,7 +58,8 @@ class Replicate(NamedTuple):
     log_density: np.ndarray | None  # [1 + m], the truth's first
     effective: float  # sample size of all draws that the pipeline made
     seconds: float
-    error: str | None
+    stage: str | None = None
+    error: Failure | None = None
 
 
 def stream(seed: int, number: int, part: int) -> np.random.SeedSequence:
@@ -81,11 +82,11 @@ def run_replicate(plan: ReplicatePlan, number: int, truth: np.ndarray) -> Replic
             every replicate would repeat.
     """
     started = time.perf_counter()
-    empty = Replicate(number, truth, np.zeros(0), truth[None][:0], None, np.nan, np.nan, None)
+    empty = Replicate(number, truth, np.zeros(0), truth[None][:0], None, np.nan, np.nan)
 
-    def failed(stage: str, error: object, observed: np.ndarray = empty.observed) -> Replicate:
+    def failed(stage: str, error: Failure, observed: np.ndarray = empty.observed) -> Replicate:
         seconds = time.perf_counter() - started
-        return empty._replace(observed=observed, seconds=seconds, error=f"{stage}: {error}")
+        return empty._replace(observed=observed, seconds=seconds, stage=stage, error=error)
 
     try:
         signal = _simulated(plan, number, truth)
@@ -95,31 +96,31 @@ def run_replicate(plan: ReplicatePlan, number: int, truth: np.ndarray) -> Replic
         job = Job(dict(zip(plan.names, truth.tolist(), strict=True)), _data_seed(plan, number))
         return failed("simulator", misshapen(plan.simulate, [job], None, error))
     except FAILURES as error:  # whatever the user's code raises costs this replicate only
-        return failed("simulator", f"{type(error).__name__}: {error}")
+        return failed("simulator", raised(error))
     try:
         observed = _observed(plan, number, signal)
     except Unusable as error:
         return failed("observe", unusable(f"an array of numbers is expected, got {error.got}"))
     except FAILURES as error:
-        return failed("observe", f"{type(error).__name__}: {error}")
+        return failed("observe", raised(error))
     if not np.isfinite(observed).any():
-        return failed("simulator", "no value of the signal is finite", observed)
+        return failed("simulator", not_finite("no value of the signal"), observed)
     try:
         made = plan.pipeline(observed.copy(), _seed(plan.seed, number, PIPELINE))
     except FAILURES as error:
-        return failed("pipeline", f"{type(error).__name__}: {error}", observed)
+        return failed("pipeline", raised(error), observed)
     drawn, log_density = made if isinstance(made, tuple) else (made, None)
     array = posterior_array(drawn, plan.names)
     if not np.isfinite(array).all():
-        return failed("pipeline", "draws are not finite", observed)
+        return failed("pipeline", not_finite("a draw"), observed)
     effective = float(array[..., 0].size) if plan.independent else effective_size(array)
     kept = thin(array, plan.draws, np.inf if plan.independent else effective)
     try:
         densities = _densities(plan, log_density, truth, kept)
     except FAILURES as error:
-        return failed("log density", f"{type(error).__name__}: {error}", observed)
+        return failed("log density", raised(error), observed)
     seconds = time.perf_counter() - started
-    return Replicate(number, truth, observed, kept, densities, effective, seconds, None)
+    return Replicate(number, truth, observed, kept, densities, effective, seconds)
 
 
 def _simulated(plan: ReplicatePlan, number: int, truth: np.ndarray) -> np.ndarray:

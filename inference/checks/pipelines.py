@@ -23,10 +23,11 @@ from ..loop import fit
 from ..prior import Prior, checked_prior
 from ..progress import progress_bar
 from ..result import Fit
-from ..simulations.bank import SimulationBank, check_bank
-from ..simulations.executors import Workers, check_executor, open_executor
+from ..simulations.bank import SimulationBank
+from ..simulations.compute import open_compute
+from ..simulations.executors import Workers
 from ..simulations.job import BATCH, OneByOne, jobs, simulation_seed, stacked
-from ..simulations.runner import Keep, check_keep, run_missing
+from ..simulations.runner import run_missing
 from ..sobol import sobol
 from ..surrogates.families import resolve
 from ..types import Simulator, SingleSimulator
@@ -181,24 +182,18 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
     check_function("simulate", simulate)
     n = checked_integer("n", n, MIN_LEARN, MOST_SIMULATIONS)
     seed = checked_integer("seed", seed, 0)
-    check_keep(checked_integer("batch", batch), timeout)
     check_progress(progress)
     checked_prior(prior)
     check_text("identity", identity)
     check_flag("warn", warn)
-    check_bank(bank)
-    check_executor(executor)
     batched, options = _batched(simulate, options or {})
     _check_options(Bolfi, options, sampling or {})
     theta = prior.from_unit(sobol(seed, 0, n, len(prior)))
     seeds = [simulation_seed(seed, i) for i in range(n)]
     with ExitStack() as stack:
-        if not isinstance(bank, SimulationBank):
-            bank = stack.enter_context(SimulationBank(bank))
-        workers = stack.enter_context(open_executor(executor))
+        compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         advance = stack.enter_context(progress_bar("simulations", n, shown=progress))
-        keep = Keep(bank, identity, batch, workers, timeout)
-        made = run_missing(batched, jobs(theta, seeds), keep, advance=advance)
+        made = run_missing(batched, jobs(theta, seeds), compute, identity=identity, advance=advance)
     good = sum(result.signal is not None for result in made)
     if good < MIN_LEARN:
         first = next((result.error for result in made if result.error), "none")

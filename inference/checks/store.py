@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..simulations.database import disk_errors, opened_database
+from ..simulations.failures import Failure, FailureKind
 from .one_replicate import Replicate
 
 SCHEMA = """
@@ -17,6 +18,8 @@ CREATE TABLE IF NOT EXISTS replicate (
     arrays    BLOB NOT NULL,
     effective REAL,
     seconds   REAL NOT NULL,
+    stage     TEXT,
+    failure   TEXT,
     error     TEXT
 );
 """
@@ -62,9 +65,10 @@ class ReplicateStore:
     def load(self) -> dict[int, Replicate]:
         """All replicates kept, by number."""
         rows = self._connection.execute(
-            "SELECT number, arrays, effective, seconds, error FROM replicate ORDER BY number"
+            "SELECT number, arrays, effective, seconds, stage, failure, error FROM replicate "
+            "ORDER BY number"
         )
-        return {row[0]: _from_row(*row) for row in rows}
+        return {row[0]: _from_row(row) for row in rows}
 
     def put(self, replicate: Replicate) -> None:
         """Keep a replicate; a finished one is never replaced, a failed one is."""
@@ -72,12 +76,18 @@ class ReplicateStore:
         file = io.BytesIO()
         np.savez_compressed(file, **{k: v for k, v in held.items() if v is not None})
         effective = None if np.isnan(replicate.effective) else replicate.effective
-        row = (replicate.number, file.getvalue(), effective, replicate.seconds, replicate.error)
+        failure = replicate.error
+        why = (None, None) if failure is None else (failure.kind.value, failure.text)
+        row = (
+            *(replicate.number, file.getvalue(), effective, replicate.seconds),
+            *(replicate.stage, *why),
+        )
         with disk_errors(self.path):
             self._connection.execute(
-                "INSERT INTO replicate VALUES (?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET "
+                "INSERT INTO replicate VALUES (?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET "
                 "arrays = excluded.arrays, effective = excluded.effective, "
-                "seconds = excluded.seconds, error = excluded.error WHERE error IS NOT NULL",
+                "seconds = excluded.seconds, stage = excluded.stage, failure = excluded.failure, "
+                "error = excluded.error WHERE error IS NOT NULL",
                 row,
             )
 
@@ -91,14 +101,15 @@ class ReplicateStore:
         self.close()
 
 
-def _from_row(
-    number: int, arrays: bytes, effective: float | None, seconds: float, error: str | None
-) -> Replicate:
+def _from_row(row: tuple) -> Replicate:
+    """The replicate of a row's columns, in the order of `load`."""
+    number, arrays, effective, seconds, stage, kind, text = row
     with np.load(io.BytesIO(arrays), allow_pickle=False) as file:
         held = dict(file)
     held.setdefault("log_density", None)
     size = np.nan if effective is None else effective
-    return Replicate(number=number, effective=size, seconds=seconds, error=error, **held)
+    error = None if kind is None else Failure(FailureKind(kind), text)
+    return Replicate(number, effective=size, seconds=seconds, stage=stage, error=error, **held)
 
 
 def _difference(path: str, stored: Mapping[str, str], settings: Mapping[str, str]) -> str:

@@ -5,12 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..prior import Prior
+from ..simulations.compute import Compute
 from .experiment import Experiment
 from .model_extension import Extensions
 from .prior_boxes import everywhere
 from .run_table import joined
 from .search import Plan, Study
-from .simulate import Keeping, SimulatorRuns
+from .simulate import Report, SimulatorRuns, silent
 
 CLEAN_PASSES = 2  # of runs where the model fits best: so far, and with what the first taught
 CLEAN_RUNS = 2  # of each; the mean of the last is free of the emulator's error
@@ -32,38 +33,41 @@ def own_residual(
     experiment: Experiment,
     prior: Prior,
     extensions: Extensions,
-    keeping: Keeping,
+    compute: Compute,
+    *,
+    report: Report = silent,
     start: int = Plan.start,
 ) -> OwnResidual:
     """What the calibrated base model leaves of data in which no effect is expected.
 
     Args:
+        compute: Where runs are made and kept.
+        report: Called with the phase and the number of simulations finished in it.
         start: Runs all over the prior, before those where the model fits best.
 
     Raises:
         RuntimeError: every simulation failed, or the executor lost its workers.
     """
-    with keeping.opened(experiment.identity) as keep:
-        simulator = SimulatorRuns(
-            simulate=experiment.simulate,
-            prior=prior,
-            extensions=extensions,
-            keep=keep,
-            seed=keeping.seed,
-            report=keeping.report,
-            shape=experiment.shape,
-        )
-        study = Study(simulator, experiment.observed, experiment.noise, Plan(start=start))
-        whole = everywhere(len(prior))
-        made = simulator.run("start", study.points(whole, (), start))
-        runs = [made]
-        fits = [study.hypothesis((), made, whole)]
-        for attempt in range(CLEAN_PASSES):
-            at_best = {name: np.full(CLEAN_RUNS, value) for name, value in fits[-1].best.items()}
-            made = simulator.run(f"best {attempt}", at_best)
-            runs.append(made)
-            fits.append(study.hypothesis((), joined(runs), whole))
-        before, fitted = fits[-2:]
-        now, then = fitted.expected(np.stack([fitted.u, before.u]))
-        moved = fitted.surrogate.output.restore((now - then)[None])[0]
+    simulator = SimulatorRuns(
+        simulate=experiment.simulate,
+        prior=prior,
+        extensions=extensions,
+        compute=compute,
+        identity=experiment.identity,
+        report=report,
+        shape=experiment.shape,
+    )
+    study = Study(simulator, experiment.observed, experiment.noise, Plan(start=start))
+    whole = everywhere(len(prior))
+    made = simulator.run("start", study.points(whole, (), start))
+    runs = [made]
+    fits = [study.hypothesis((), made, whole)]
+    for attempt in range(CLEAN_PASSES):
+        at_best = {name: np.full(CLEAN_RUNS, value) for name, value in fits[-1].best.items()}
+        made = simulator.run(f"best {attempt}", at_best)
+        runs.append(made)
+        fits.append(study.hypothesis((), joined(runs), whole))
+    before, fitted = fits[-2:]
+    now, then = fitted.expected(np.stack([fitted.u, before.u]))
+    moved = fitted.surrogate.output.restore((now - then)[None])[0]
     return OwnResidual(experiment.observed - made.signals.mean(0) - moved, fitted.best)

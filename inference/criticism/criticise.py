@@ -3,13 +3,18 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import check_kind, checked_number, is_table
+from ..arguments import check_function, check_kind, checked_integer, checked_number, is_table
 from ..notebook_display import as_html, as_text
 from ..prior import Prior, checked_prior
+from ..simulations.bank import SimulationBank
+from ..simulations.compute import open_compute
+from ..simulations.executors import Workers
+from ..simulations.job import BATCH
 from .experiment import Experiment, Proposal
 from .held_out import Gap, gap, holds, predict
 from .hypothesis import Hypothesis
@@ -20,7 +25,7 @@ from .next_experiment import Suggestion, suggest
 from .posterior import Interval, Weighted, weighted_posterior
 from .search import Base, Plan, Study, examine, explain
 from .signatures import confusion
-from .simulate import AllRunsFailed, Keeping, SimulatorRuns
+from .simulate import AllRunsFailed, Report, SimulatorRuns, silent
 from .usual_residual import model_error_rms, without_model_error
 from .verdict import REJECTION_LEVEL, Candidate, Verdict, VerdictKind, conclude, tied
 
@@ -148,7 +153,12 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     accept: Sequence[str] | None = None,
     level: float = REJECTION_LEVEL,
     plan: Plan | None = None,
-    keeping: Keeping | None = None,
+    seed: int = 0,
+    report: Report = silent,
+    executor: Workers | None = None,
+    bank: str | Path | SimulationBank = ":memory:",
+    batch: int = BATCH,
+    timeout: float | None = None,
 ) -> Criticism:
     """Test a simulator against data, and look for what it lacks.
 
@@ -172,8 +182,10 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         accept: Effects to accept, whatever the verdict; None accepts what the verdict names.
         level: p-value below which the base model is rejected.
         plan: How many runs each step may make.
-        keeping: Where runs are kept and how they are made: bank, executor, timeout and the seed
-            of everything random. None is `Keeping()`, which forgets the runs.
+        seed: Fixes everything random.
+        report: Called with the phase and the number of simulations finished in it.
+        executor, bank, timeout: See `fit`.
+        batch: Simulations in one call of the simulator, where there is no executor.
 
     Raises:
         ValueError: an argument makes no sense, a held-out experiment is the fitted one, or the
@@ -187,22 +199,30 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     _check_experiments(experiment, held_out, proposals)
     checked_number("level", level, lambda p: 0.0 < p < 1.0, "a number between 0 and 1")
     check_kind("plan", plan, Plan | None)
-    check_kind("keeping", keeping, Keeping | None)
+    checked_integer("seed", seed, 0)
+    check_function("report", report)
     _check_earlier(earlier)
     _check_held_out(experiment, held_out)
     _check_accept(accept, extensions)
     _check_told_apart(held_out)
     _check_told_apart(proposals)
-    kept, count = keeping or Keeping(), 0
+    count = 0
 
     def counted(phase: str, finished: int) -> None:
         nonlocal count
         count += finished
-        kept.report(phase, finished)
+        report(phase, finished)
 
-    with kept.opened(experiment.identity) as keep:
+    with open_compute(executor, timeout, batch, bank) as compute:
         simulator = SimulatorRuns(
-            experiment.simulate, prior, extensions, keep, kept.seed, counted, experiment.shape
+            experiment.simulate,
+            prior,
+            extensions,
+            compute,
+            seed,
+            counted,
+            experiment.shape,
+            experiment.identity,
         )
         study = Study(simulator, experiment.corrected, experiment.noise, plan or Plan())
         base, untested = examine(study, None if earlier is None else simulator.table(*earlier))
@@ -216,7 +236,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     extended = leading.hypothesis if leading else None
     left = []
     if extended is not None:
-        null = null_draws(extended, study.noise, np.random.default_rng(kept.seed))
+        null = null_draws(extended, study.noise, np.random.default_rng(seed))
         left = locate(extended, experiment.windows, null)
     return Criticism(
         verdict=verdict,
@@ -224,7 +244,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         base=base,
         candidates=tuple(tried.candidates),
         extended=extended,
-        posterior=weighted_posterior(extended or base.hypothesis, kept.seed),
+        posterior=weighted_posterior(extended or base.hypothesis, seed),
         before=tuple(locate(base.hypothesis, experiment.windows, base.null)),
         after=tuple(left),
         gaps=tried.gaps,

@@ -1,25 +1,23 @@
 """Runs of a simulator and of its extensions, kept in a bank."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from ..arguments import check_function, check_kind, checked_integer
 from ..prior import Prior
-from ..simulations.bank import Simulation, SimulationBank
-from ..simulations.executors import Workers, check_executor, open_executor
+from ..simulations.bank import Simulation
+from ..simulations.compute import Compute
 from ..simulations.failures import NoSignals
-from ..simulations.job import BATCH, jobs, succeeded
-from ..simulations.runner import Keep, check_keep, run_missing
+from ..simulations.job import jobs, succeeded
+from ..simulations.runner import run_missing
 from ..types import Simulator
 from .experiment import Experiment, Proposal
 from .model_extension import Extensions
 from .run_table import Runs
 
-Report = Callable[[str, int], None]
+Report = Callable[[str, int], object]
 """(phase, simulations finished in it since the last call)"""
 
 
@@ -32,52 +30,6 @@ def silent(phase: str, finished: int) -> None:
 
 
 @dataclass(frozen=True)
-class Keeping:
-    """Where simulations are kept, and how they are made.
-
-    Attributes:
-        bank: Takes every finished simulation; what it holds is not simulated again. None keeps
-            them until the call ends.
-        batch: Simulations in one call of the simulator, where there is no executor.
-        seed: All of their seeds derive from it.
-        report: Called with the phase and the number of simulations finished in it.
-        executor: Makes the simulations, see `fit`; what is given open stays open. None simulates
-            in this process.
-        timeout: Seconds that one simulation may take, see `fit`; None sets no limit.
-
-    Raises:
-        ValueError: a batch, seed, report or timeout that cannot be used.
-    """
-
-    bank: SimulationBank | None = None
-    batch: int = BATCH
-    seed: int = 0
-    report: Report = silent
-    executor: Workers | None = None
-    timeout: float | None = None
-
-    def __post_init__(self) -> None:
-        check_keep(checked_integer("batch", self.batch), self.timeout)
-        checked_integer("seed", self.seed, 0)
-        check_function("report", self.report)
-        if self.bank is not None:
-            check_kind("bank", self.bank, SimulationBank)
-        check_executor(self.executor)
-
-    @contextmanager
-    def opened(self, identity: str) -> Iterator[Keep]:
-        """Bank and executor for the simulator of this name; what is opened here is closed.
-
-        Raises:
-            ValueError, ImportError, ConnectionError: the executor cannot be used.
-        """
-        with ExitStack() as stack:
-            workers = stack.enter_context(open_executor(self.executor))
-            bank = stack.enter_context(SimulationBank()) if self.bank is None else self.bank
-            yield Keep(bank, identity, self.batch, workers, self.timeout)
-
-
-@dataclass(frozen=True)
 class SimulatorRuns:
     """A simulator whose runs are kept.
 
@@ -86,25 +38,26 @@ class SimulatorRuns:
             coefficients those that act.
         prior: Of the base parameters.
         extensions: All that may act.
-        keep: Where runs are made and kept.
-        shape: Of one signal, that of what was observed; None takes the commonest of a phase.
+        compute: Where runs are made and kept.
         seed: All seeds derive from it.
         report: Called with the phase and the number of simulations finished in it.
+        shape: Of one signal, that of what was observed; None takes the commonest of a phase.
+        identity: The simulator's name in the bank.
     """
 
     simulate: Simulator
     prior: Prior
     extensions: Extensions
-    keep: Keep
+    compute: Compute
     seed: int = 0
     report: Report = silent
     shape: tuple[int, ...] | None = None
+    identity: str = ""
 
     def of(self, experiment: Experiment | Proposal) -> "SimulatorRuns":
         """The same for the simulator of another experiment."""
-        keep = self.keep._replace(identity=experiment.identity)
-        shape = experiment.shape
-        return replace(self, simulate=experiment.simulate, keep=keep, shape=shape)
+        own = {"identity": experiment.identity, "shape": experiment.shape}
+        return replace(self, simulate=experiment.simulate, **own)
 
     def run(self, phase: str, theta: Mapping[str, np.ndarray]) -> Runs:
         """Simulate at theta, name -> [n]; runs that fail are left out.
@@ -138,8 +91,9 @@ class SimulatorRuns:
             results = run_missing(
                 self.simulate,
                 sum(asked, []),
-                self.keep,
+                self.compute,
                 self.shape,
+                identity=self.identity,
                 advance=partial(self.report, phase),
             )
         except NoSignals as error:

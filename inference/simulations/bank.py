@@ -17,6 +17,7 @@ import numpy as np
 from ..arguments import check_text, checked_integer
 from ..notebook_display import as_html, as_text
 from .database import disk_errors, opened_database
+from .failures import Failure, FailureKind
 from .simulation_locks import Claims
 
 logger = logging.getLogger(__name__)
@@ -30,6 +31,7 @@ CREATE TABLE IF NOT EXISTS simulation (
     signal   BLOB,
     dtype    TEXT,
     shape    TEXT,
+    failure  TEXT,
     error    TEXT,
     seconds  REAL NOT NULL,
     created  REAL NOT NULL,
@@ -43,7 +45,7 @@ class Simulation(NamedTuple):
     """One finished run; `signal` is None where `error` says why it failed."""
 
     signal: np.ndarray | None
-    error: str | None
+    error: Failure | None
     seconds: float
 
 
@@ -118,7 +120,7 @@ class SimulationBank:
         key = _key(identity, theta, seed)
         with self._lock:
             row = self._connection.execute(
-                "SELECT signal, dtype, shape, error, seconds, digest FROM simulation "
+                "SELECT signal, dtype, shape, failure, error, seconds, digest FROM simulation "
                 "WHERE identity = ? AND theta = ? AND seed = ?",
                 key,
             ).fetchone()
@@ -129,13 +131,12 @@ class SimulationBank:
             with self._lock:  # else it could not be put again
                 self._connection.execute("DELETE FROM simulation WHERE digest = ?", (digest,))
             return None
-        blob, dtype, shape, error, seconds = kept
+        blob, dtype, shape, kind, text, seconds = kept
         signal = None if blob is None else _signal(blob, dtype, shape)
-        return Simulation(signal, error, seconds)
+        return Simulation(signal, kind and Failure(FailureKind(kind), text), seconds)
 
     def _is_whole(self, row: tuple, digest: bytes) -> bool:
-        """Whether a row, (identity, theta, seed, signal, dtype, shape, error, seconds), is as it
-        was stored."""
+        """Whether a row, see `_digest`, is as it was stored."""
         if _digest(row) == digest:
             return True
         logger.warning("%s: a damaged row counts as not simulated: %s", self.path, row[1:3])
@@ -158,14 +159,16 @@ class SimulationBank:
         if simulation.signal is not None:
             signal = np.ascontiguousarray(simulation.signal)
             blob, dtype, shape = signal.tobytes(), signal.dtype.str, json.dumps(signal.shape)
+        failure = simulation.error
+        why = (None, None) if failure is None else (failure.kind.value, failure.text)
         seconds = float(simulation.seconds)
-        row = (*_key(identity, theta, seed), blob, dtype, shape, simulation.error, seconds)
+        row = (*_key(identity, theta, seed), blob, dtype, shape, *why, seconds)
         with self._lock, disk_errors(self.path):
             self._connection.execute(
-                "INSERT INTO simulation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) "
+                "INSERT INTO simulation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) "
                 "ON CONFLICT DO UPDATE SET signal = excluded.signal, dtype = excluded.dtype, "
-                "shape = excluded.shape, error = excluded.error, seconds = excluded.seconds, "
-                "created = excluded.created, digest = excluded.digest "
+                "shape = excluded.shape, failure = excluded.failure, error = excluded.error, "
+                "seconds = excluded.seconds, created = excluded.created, digest = excluded.digest "
                 "WHERE simulation.signal IS NULL",
                 (*row, time.time(), _digest(row)),
             )
@@ -192,8 +195,8 @@ class SimulationBank:
         check_text("identity", identity)
         with self._lock:
             rows = self._connection.execute(
-                "SELECT theta, seed, signal, dtype, shape, error, seconds, digest FROM simulation "
-                "WHERE identity = ? AND signal IS NOT NULL ORDER BY theta, seed",
+                "SELECT theta, seed, signal, dtype, shape, failure, error, seconds, digest "
+                "FROM simulation WHERE identity = ? AND signal IS NOT NULL ORDER BY theta, seed",
                 (identity,),
             ).fetchall()
         rows = [row for row in rows if self._is_whole((identity, *row[:-1]), row[-1])]
@@ -269,7 +272,7 @@ def _key(identity: str, theta: Mapping[str, float], seed: int) -> tuple[str, str
 
 
 def _digest(row: tuple) -> bytes:
-    """Of identity, theta, seed, signal, dtype, shape, error and seconds."""
+    """Of identity, theta, seed, signal, dtype, shape, kind of failure, error and seconds."""
     signal = row[3] or b""
     return sha256(repr((*row[:3], *row[4:])).encode() + signal).digest()
 

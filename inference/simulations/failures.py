@@ -1,15 +1,16 @@
-"""Failure messages of simulations, and their classification."""
+"""Why a run of a simulator has no signal that can be learned from."""
 
 import os
 import traceback
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
 
-class Failure(StrEnum):
-    """Kinds of failed runs, by the word that begins or stands for the sentence that is kept."""
+class FailureKind(StrEnum):
+    """Kinds of failed runs."""
 
     RAISED = "raised"
     NOT_FINITE = "not finite"  # the simulator returned NaN or infinity
@@ -17,6 +18,23 @@ class Failure(StrEnum):
     UNUSABLE = "unusable"  # the simulator returned something else than a signal
     INCOMPARABLE = "incomparable"  # the user's discrepancy or summary failed on the signal
     IMPOSSIBLE = "impossible"  # the log likelihood is -inf
+
+
+@dataclass(frozen=True)
+class Failure:
+    """One failed run.
+
+    Attributes:
+        kind: Of the failure.
+        text: What happened; of what was raised, its type's name, its text, and the user's line.
+    """
+
+    kind: FailureKind
+    text: str
+
+    def __str__(self) -> str:
+        raised = self.kind is FailureKind.RAISED
+        return self.text if raised else f"{self.kind}: {self.text}"
 
 
 class NoSignals(ValueError):
@@ -27,14 +45,15 @@ _ENGINE = f"{Path(__file__).parents[1]}{os.sep}"
 _INSTALLED = f"{os.sep}lib{os.sep}python"  # of Python's own modules and of packages
 
 
-def raised(error: BaseException) -> str:
-    """What is kept of an exception: its type's name, its text, and the user's line, if any."""
+def raised(error: BaseException) -> Failure:
+    """The failure of a run that raised."""
     try:
         said = str(error)
     except Exception:  # an exception may fail at its own text
         said = "no text"
     text = f"{type(error).__name__}: {said}{_line(error)}"
-    return text.encode(errors="backslashreplace").decode()  # file names may hold half characters
+    # file names may hold half characters
+    return Failure(FailureKind.RAISED, text.encode(errors="backslashreplace").decode())
 
 
 def _line(error: BaseException) -> str:
@@ -45,32 +64,26 @@ def _line(error: BaseException) -> str:
     return ""
 
 
-def timed_out(timeout: float) -> str:
-    return f"{Failure.TIMEOUT}: no signal after {timeout:g} s"
+def timed_out(timeout: float) -> Failure:
+    return Failure(FailureKind.TIMEOUT, f"no signal after {timeout:g} s")
 
 
-def not_finite(what: str) -> str:
-    return f"{Failure.NOT_FINITE}: {what}"
+def not_finite(what: str) -> Failure:
+    return Failure(FailureKind.NOT_FINITE, what)
 
 
-def unusable(what: str) -> str:
-    return f"{Failure.UNUSABLE}: {what}"
+def unusable(what: str) -> Failure:
+    return Failure(FailureKind.UNUSABLE, what)
 
 
-def incomparable(what: str) -> str:
-    return f"{Failure.INCOMPARABLE}: {what}"
+def incomparable(what: str) -> Failure:
+    return Failure(FailureKind.INCOMPARABLE, what)
 
 
-def impossible(what: str) -> str:
-    return f"{Failure.IMPOSSIBLE}: {what}"
+def impossible(what: str) -> Failure:
+    return Failure(FailureKind.IMPOSSIBLE, what)
 
 
-def kind(error: str) -> Failure:
-    """The kind of a failure of which a sentence is kept."""
-    prefix = error.partition(":")[0]
-    return next((one for one in Failure if one == prefix), Failure.RAISED)
-
-
-def count(errors: Iterable[str]) -> dict[str, int]:
-    """Failures by kind; kinds that did not occur, and "" for success, are left out."""
-    return dict(Counter(kind(error).value for error in errors if error))
+def count(failures: Iterable[Failure | None]) -> dict[str, int]:
+    """Failures by kind; kinds that did not occur, and None for success, are left out."""
+    return dict(Counter(one.kind.value for one in failures if one is not None))

@@ -17,7 +17,7 @@ import numpy as np
 from ..arguments import Unusable, checked_integer, checked_mapping, float64
 from ..types import Simulator, SingleSimulator
 from .bank import Simulation
-from .failures import Failure, kind, raised, timed_out, unusable
+from .failures import Failure, FailureKind, raised, timed_out, unusable
 from .returned import commonest, signals_of
 
 BATCH = 4  # runs in one call, or in flight, where nobody says how many
@@ -97,7 +97,7 @@ class OneByOne:
 
 def is_unusable(result: Simulation) -> bool:
     """Whether the simulator returned something else than a signal."""
-    return result.error is not None and kind(result.error) is Failure.UNUSABLE
+    return result.error is not None and result.error.kind is FailureKind.UNUSABLE
 
 
 def of_one_shape(
@@ -204,8 +204,8 @@ def run_batch(
 
 def misshapen(
     simulate: Simulator, batch: Sequence[Job], shape: tuple[int, ...] | None, error: Unusable
-) -> str:
-    """What is kept of a simulator that returned something else than signals for these jobs."""
+) -> Failure:
+    """The failure of a simulator that returned something else than signals for these jobs."""
     of_which = f" for {batch[0].theta}, seed {batch[0].seed}" if len(batch) == 1 else ""
     if isinstance(simulate, OneByOne):
         due = "" if shape is None else f", of shape {shape}"

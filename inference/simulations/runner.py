@@ -3,14 +3,15 @@
 import pickle
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, wait
+from contextlib import ExitStack, nullcontext
 from functools import partial
 from typing import NamedTuple
 
-from ..arguments import check_timeout, checked_integer
 from ..types import Simulator
 from .bank import Simulation, SimulationBank
+from .compute import Compute
 from .executors import killed_its_worker, workers_of
-from .failures import Failure, NoSignals, kind, raised, unusable
+from .failures import FailureKind, NoSignals, raised, unusable
 from .job import (
     BATCH,
     Job,
@@ -36,27 +37,6 @@ class Order(NamedTuple):
     outcome: "Future[Simulation]"
 
 
-class Keep(NamedTuple):
-    """Where simulations are made, and where they are kept.
-
-    Attributes:
-        bank: Takes every finished simulation; what it holds is not simulated again.
-        identity: The simulator's name in the bank.
-        batch: Simulations in one call of the simulator, and kept together, where there is no
-            executor; None is all of them.
-        executor: Simulates each job in a call of its own; a pool several, if the simulator asks for
-            it, see `most_together`; None simulates in this process.
-        timeout: Seconds that one simulation may take, those of one call together as many times
-            as long; None sets no limit.
-    """
-
-    bank: SimulationBank
-    identity: str = ""
-    batch: int | None = None
-    executor: Executor | None = None
-    timeout: float | None = None
-
-
 class Runner:
     """A simulator with the bank that keeps what it returns; close it, or use it in a `with`.
 
@@ -70,20 +50,22 @@ class Runner:
 
     Args:
         simulate: The user's simulator.
-        keep: Where simulations are made and kept; the caller decides on batches.
+        compute: Where simulations are made and kept; the caller decides on batches.
+        identity: The simulator's name in the bank.
 
     Raises:
-        ValueError: a batch or timeout that is not positive, or the simulator's `neutral` maps no
-            names.
+        ValueError: the simulator's `neutral` maps no names.
     """
 
-    def __init__(self, simulate: Simulator, keep: Keep):
-        check_keep(keep.batch, keep.timeout)
+    def __init__(self, simulate: Simulator, compute: Compute, identity: str = ""):
         neutral_of(simulate)  # refused now, not by a worker
         self.simulate = simulate
         self._misshapen_until = BATCH  # results, whatever the batch; 0 once another came
         self._misshapen = 0
-        self.bank, self.identity, _, self.executor, self.timeout = keep
+        self._resources = ExitStack()
+        own = SimulationBank() if compute.bank is None else nullcontext(compute.bank)
+        self.bank = self._resources.enter_context(own)
+        self.executor, self.timeout, self.identity = compute.executor, compute.timeout, identity
         self._elsewhere: list[Order] = []  # claimed by somebody else
         self._mine: dict[Future[Simulation], Job] = {}  # claimed here, by outcome
         self._submitted: set[Future[list[Simulation]]] = set()
@@ -104,6 +86,7 @@ class Runner:
             future.cancel()
         for outcome in list(self._mine):
             self._release(outcome)
+        self._resources.close()
 
     def run(self, batch: Sequence[Job], shape: Shape) -> list[Simulation]:
         """Results of all jobs, in order, once all are finished.
@@ -144,12 +127,12 @@ class Runner:
     def _check_first(self, made: Simulation) -> None:
         if not self._misshapen_until:
             return
-        if not is_unusable(made):
+        if made.error is None or not is_unusable(made):
             self._misshapen_until = 0
             return
         self._misshapen += 1
         if self._misshapen == self._misshapen_until:
-            raise NoSignals(str(made.error).removeprefix(unusable("")))
+            raise NoSignals(made.error.text)
 
     def _begin(self) -> None:
         """Take from the bank or simulate whatever nobody else is simulating."""
@@ -297,13 +280,6 @@ def _is_of_pickling(error: BaseException, simulate: Simulator) -> bool:
     return False
 
 
-def check_keep(batch: int | None, timeout: float | None) -> None:
-    """Raise ValueError unless simulations can be made in such batches and times; see `Keep`."""
-    if batch is not None:
-        checked_integer("batch", batch)
-    check_timeout(timeout)
-
-
 def is_final(found: Simulation, timeout: float | None) -> bool:
     """Whether a stored simulation need not be tried again.
 
@@ -312,7 +288,7 @@ def is_final(found: Simulation, timeout: float | None) -> bool:
     """
     if found.error is None:
         return True
-    if kind(found.error) is not Failure.TIMEOUT:
+    if found.error.kind is not FailureKind.TIMEOUT:
         return False
     return timeout is not None and timeout <= found.seconds
 
@@ -320,9 +296,10 @@ def is_final(found: Simulation, timeout: float | None) -> bool:
 def run_missing(
     simulate: Simulator,
     jobs: Sequence[Job],
-    keep: Keep,
+    compute: Compute,
     shape: Shape = None,
     *,
+    identity: str = "",
     advance: Callable[[int], object] = lambda count: None,
 ) -> list[Simulation]:
     """Results of all jobs, in order; those that the bank lacks are simulated, see `Runner`.
@@ -330,16 +307,18 @@ def run_missing(
     Args:
         simulate: The user's simulator.
         jobs: What is wanted.
-        keep: Where simulations are made and kept.
+        compute: Where simulations are made and kept.
         shape: Of one signal; None accepts any.
+        identity: The simulator's name in the bank.
         advance: Called with 1 for each result, in order; those of a batch come together.
 
     Raises:
         NoSignals: the simulator returned something else than signals for all of the first runs.
     """
-    at_once = len(jobs) if keep.batch is None or keep.executor is not None else keep.batch
+    shared_out = compute.executor is not None
+    at_once = compute.batch if compute.batch is not None and not shared_out else len(jobs)
     results = []
-    with Runner(simulate, keep) as runner:
+    with Runner(simulate, compute, identity) as runner:
         for start in range(0, len(jobs), max(at_once, 1)):
             for outcome in runner.start(jobs[start : start + at_once], shape):
                 results.append(runner.result(outcome))

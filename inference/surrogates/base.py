@@ -7,6 +7,7 @@ import numpy as np
 
 from ..gp.process import GP
 from ..prior import Prior
+from ..simulations.failures import Failure
 from ..types import LogLikelihood, LogSecondMoment, Theta
 from .success import RunOutcomes
 
@@ -26,7 +27,7 @@ class Measured(NamedTuple):
 
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n], NaN where a run failed
-    errors: list[str]  # [n], why the user's own function could not compare a signal; "" elsewhere
+    errors: list[Failure | None]  # [n], of the user's own function that compares signals
 
 
 class Surrogate(Protocol):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_callable, check_flag, checked_array, checked_integer, checked_number
-from ..simulations.failures import not_finite
+from ..simulations.failures import Failure, not_finite
 from ..types import Discrepancy
 from .base import Measured, Surrogate, TrainingData
 from .discrepancy import DiscrepancySurrogate, learn, with_threshold
@@ -239,15 +239,14 @@ class SignalLearner:
         failed = ~np.isfinite(features).all(1)
         return Measured(features, np.where(failed, np.nan, discrepancy), errors)
 
-    def _infinite_summary(self, signal: np.ndarray | None) -> str:
-        """What is kept of a finite signal whose summary is not; "" of any other."""
+    def _infinite_summary(self, signal: np.ndarray | None) -> Failure | None:
+        """The failure of a run whose signal is finite and its summary is not."""
         compared = self.family.summary is not None and self.family.discrepancy is None
         if not compared or signal is None or not np.isfinite(signal).all():
-            return ""
+            return None
         values = summarise(self.family.summary, signal)
-        return (
-            "" if np.isfinite(values).all() else not_finite(f"summary returns {infinities(values)}")
-        )
+        finite = bool(np.isfinite(values).all())
+        return None if finite else not_finite(f"summary returns {infinities(values)}")
 
     def learn(self, known: TrainingData, previous: SignalSurrogate | None) -> SignalSurrogate:
         u, values = known.u, known.features

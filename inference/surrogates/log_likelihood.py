@@ -24,7 +24,7 @@ from ..gp.process import (
 )
 from ..sampling.importance import explore
 from ..sampling.target import Target
-from ..simulations.failures import impossible, incomparable, not_finite
+from ..simulations.failures import Failure, impossible, incomparable, not_finite
 from ..types import LogLikelihood, LogSecondMoment
 from .base import Measured, TrainingData
 from .success import learn_success, log_success, padded_success
@@ -360,7 +360,8 @@ class LogLikelihoodLearner:
 
     def measure(self, signals: Sequence[np.ndarray | None]) -> Measured:
         """Sds [n, 1] and minus the log likelihoods of n signals, None where a run failed."""
-        found, errors = np.full((len(signals), 2), np.nan), [""] * len(signals)
+        found = np.full((len(signals), 2), np.nan)
+        errors: list[Failure | None] = [None] * len(signals)
         for i, signal in enumerate(signals):
             if signal is None or (signal.size and np.isnan(signal).all()):
                 continue
@@ -383,8 +384,8 @@ class LogLikelihoodLearner:
         return self.learn(known, None).cautious
 
 
-def _unlikely(signal: np.ndarray) -> str:
-    """Why a signal is no log likelihood of data that are possible; "" if it is one."""
+def _unlikely(signal: np.ndarray) -> Failure | None:
+    """Why a signal is no log likelihood of data that are possible; None if it is one."""
     if not 1 <= signal.size <= 2:
         return incomparable(
             f"a log likelihood is one number, or two with its sd, got a signal of {signal.shape}"
@@ -394,4 +395,4 @@ def _unlikely(signal: np.ndarray) -> str:
         return impossible("the log likelihood is -inf")
     if not np.isfinite(value) or not all(0.0 <= one < np.inf for one in sd):
         return not_finite(f"a log likelihood, or its sd, which is from 0: {signal.ravel()}")
-    return ""
+    return None

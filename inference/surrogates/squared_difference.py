@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import checked_array
-from ..simulations.failures import incomparable, raised
+from ..simulations.failures import Failure, incomparable, raised
 from ..types import Discrepancy
 from .output_vectors import MIN_SERIES
 
@@ -86,7 +86,7 @@ def evaluate(
     observed: np.ndarray,
     signals: Sequence[np.ndarray | None],
     named: str = "discrepancy",
-) -> tuple[np.ndarray, list[str]]:
+) -> tuple[np.ndarray, list[Failure | None]]:
     """Discrepancy of each signal, and why there is none.
 
     Args:
@@ -98,9 +98,10 @@ def evaluate(
 
     Returns:
         float64 [n], NaN where a run failed or has no finite discrepancy; and for each signal why
-        it cannot be compared, "" elsewhere.
+        it cannot be compared, None elsewhere.
     """
-    values, errors = np.full(len(signals), np.nan), [""] * len(signals)
+    values = np.full(len(signals), np.nan)
+    errors: list[Failure | None] = [None] * len(signals)
     for i, signal in enumerate(signals):
         if signal is None or (signal.size and np.isnan(signal).all()):
             continue
@@ -111,8 +112,10 @@ def evaluate(
     return values, errors
 
 
-def failed_on(named: str, signal: np.ndarray, observed: np.ndarray, error: BaseException) -> str:
-    """What is kept of an error of the user's function that was given this signal."""
+def failed_on(
+    named: str, signal: np.ndarray, observed: np.ndarray, error: BaseException
+) -> Failure:
+    """The failure of a run on whose signal the user's function raised."""
     return incomparable(
         f"the {named} failed on a signal of shape {signal.shape}, observed being of shape "
         f"{observed.shape} ({raised(error)})"

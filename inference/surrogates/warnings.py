@@ -8,7 +8,7 @@ import numpy as np
 
 from .._lazy import stats
 from ..history import History
-from ..simulations.failures import Failure
+from ..simulations.failures import FailureKind
 from .squared_difference import independent
 
 FALSE_ALARMS = 1e-3  # of each leave-one-out check, were its errors independent and normal
@@ -187,7 +187,7 @@ def _too_large(errors: np.ndarray, matters: float) -> bool:
 def history_warnings(history: History) -> list[str]:
     """That most simulations failed, and that equal seeds gave unlike signals."""
     told, succeeded = len(history.theta), int(history.succeeded.sum())
-    failed = told - succeeded - history.failures.get(Failure.IMPOSSIBLE.value, 0)
+    failed = told - succeeded - history.failures.get(FailureKind.IMPOSSIBLE.value, 0)
     contradicting = history.contradicting
     said = []
     if failed > FAILED_SHARE * told:

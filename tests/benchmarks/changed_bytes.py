@@ -25,7 +25,7 @@ from bolfi_liquids.inference import SimulationBank
 
 import bolfi_liquids as bl
 from bolfi_liquids.reporting.warnings import Results, warnings_of
-from bolfi_liquids.robot.chosen_pour import chosen_pour
+from bolfi_liquids.robot.pour import chosen_pour
 from bolfi_liquids.run.run import Run
 
 FILES = (

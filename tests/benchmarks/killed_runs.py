@@ -1,14 +1,19 @@
-"""Commands are killed at random moments and repeated: the same bits, and nothing simulated twice.
+"""Commands are stopped at random moments and repeated: the same bits, and nothing simulated twice.
 
-    python tests/benchmarks/killed_runs.py [--kills 60] [--seed 0]
+    python tests/benchmarks/killed_runs.py [--kills 60] [--disks 10] [--seed 0]
 
-Each kill is of `calibrate`, `criticise` or `pour` on a small run, by SIGKILL, SIGTERM or SIGINT.
-The command is then repeated (`calibrate` with --resume), and its run compared with one that nobody
-disturbed: draws, chosen action, simulations, and when those were made that the killed one had.
+A kill is of `calibrate`, `criticise`, `pour` or `check sbc` on a small run, or of
+`record --emulator`, by SIGKILL, SIGTERM or SIGINT; a full disk is a limit on the size of files
+(EFBIG), which needs no right to mount one. The command is then repeated (`calibrate` with
+--resume), and what it has concluded compared with a run that nobody disturbed: numbers,
+simulations, and when those were made that the stopped one had. A recording cannot be repeated:
+its processes must end, and another one must succeed.
 """
 
 import argparse
+import json
 import os
+import resource
 import shutil
 import signal
 import sqlite3
@@ -16,7 +21,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, suppress
 from importlib.resources import files
 from pathlib import Path
 
@@ -24,114 +30,196 @@ import numpy as np
 import xarray as xr
 
 import bolfi_liquids as bl
+from bolfi_liquids.run.result_file import read_result
 from bolfi_liquids.run.run import SIMULATIONS, Run
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 SAMPLES = 60  # 2 s of the bundled recording
-CALIBRATE = "--budget 8 --batch 2 --particles 200 --seed 5".split()
-COMMANDS = {
-    "calibrate": lambda run, stir: ["calibrate", str(stir), "--out", str(run), *CALIBRATE],
-    "criticise": lambda run, _: ["criticise", str(run), "--effects", "camera_delay"],
-    "pour": lambda run, _: ["pour", str(run), "--budget", "24", "--iterations", "7", "--force"],
+ENDED = 10.0  # s, until every process of a recording that was killed must be gone
+SMALL_DISK = 2_000, 2_000_000  # bytes that a file may have, at least and at most
+GROUPS = {"calibrate": "posterior", "criticise": "posterior", "pour": "chosen"}
+STUDY = "--runs 6 --sequential 2 --design 8 --budget 10 --particles 200".split()
+WORDS = {
+    "calibrate": "--budget 8 --batch 2 --particles 200 --seed 5".split(),
+    "criticise": "--effects camera_delay".split(),
+    "pour": "--budget 24 --iterations 7 --force".split(),
 }
+RUN_STAGES = tuple(WORDS)
+STAGES = (*RUN_STAGES, "check sbc", "record")
 CODE = "from bolfi_liquids.cli.app import main; main()"
 
 
-def command(name, run, stir, *, again=False):
-    """What is typed for a step, and typed again after it was killed."""
-    more = ["--resume"] if again and name == "calibrate" and run.exists() else []
-    return [sys.executable, "-W", "ignore", "-c", CODE, *COMMANDS[name](run, stir), *more]
+def command(stage, run, stir, *, again=False):
+    """What is typed for a stage, and typed again after it was stopped."""
+    match stage:
+        case "calibrate":
+            resume = ["--resume"] if again and (run / "run.toml").exists() else []
+            words = ["calibrate", stir, "--out", run, *WORDS[stage], *resume]
+        case "check sbc":
+            words = ["check", "sbc", "--recording", stir, "--out", run, "--workers", "1", *STUDY]
+        case "record":
+            words = ["record", "--emulator", "--cycles", "1", "--out", run]
+        case _:
+            words = [stage, run, *WORDS[stage]]
+    return [sys.executable, "-W", "ignore", "-c", CODE, *map(str, words)]
 
 
 def made(run):
-    """(identity, theta, seed) -> when it was made, of every simulation of a run."""
-    path = run / SIMULATIONS
-    if not path.exists():
-        return {}
-    with closing(sqlite3.connect(path)) as bank:
-        try:
-            rows = bank.execute("SELECT identity, theta, seed, created FROM simulation").fetchall()
-        except sqlite3.OperationalError:  # the file is there, its table not yet
-            return {}
-    return {row[:3]: row[3] for row in rows}
+    """(file, identity, theta, seed) -> when it was made, of every simulation of a run."""
+    found = {}
+    for path in run.glob(SIMULATIONS):
+        with closing(sqlite3.connect(path)) as bank, suppress(sqlite3.OperationalError):
+            # there may be a file without its table yet
+            for row in bank.execute("SELECT identity, theta, seed, created FROM simulation"):
+                found[(path.name, *row[:3])] = row[3]
+    return found
 
 
-def concluded(run, name):
-    """The numbers of a step's result."""
-    tree = Run.open(run).required(name)
-    group = "chosen" if name == "pour" else "posterior"
-    return {key: values.to_numpy() for key, values in tree[group].data_vars.items()}
+def concluded(stage, run):
+    """The numbers of a stage's result, by name."""
+    if stage == "check sbc":
+        tree = read_result(run / "sbc.nc")
+        groups = {name: tree[f"{name}/replicates"] for name in tree.children}
+    else:
+        groups = {stage: Run.open(run).required(stage)[GROUPS[stage]]}
+    return {
+        (group, key): values.to_numpy()
+        for group, there in groups.items()
+        for key, values in there.data_vars.items()
+        if key != "seconds"
+    }
 
 
-def run_of(stage, stir, folder):
+def whole_run(stage, stir, folder):
     """An undisturbed run up to and with a stage, and how long that stage took [s]."""
-    run, seconds = folder / f"whole_{stage}", 0.0
-    for name in COMMANDS:
+    run, seconds = folder / f"whole {stage}", 0.0
+    before = RUN_STAGES[: RUN_STAGES.index(stage)] if stage in RUN_STAGES else ()
+    for name in (*before, stage):
+        if name == stage and run.exists():
+            shutil.copytree(run, folder / f"before {stage}")
         began = time.monotonic()
-        subprocess.run(command(name, run, stir), check=True, capture_output=True)
+        done = subprocess.run(command(name, run, stir), capture_output=True, check=False)
         seconds = time.monotonic() - began
-        if name == stage:
-            return run, seconds
-        shutil.copytree(run, folder / f"before_{stage}", dirs_exist_ok=True)
-    raise KeyError(stage)
+        assert done.returncode in ((0, 1) if stage == "check sbc" else (0,)), done.stderr
+    return run, seconds
 
 
-def killed(name, run, stir, number, after):
-    """Begin a step and kill it after so many seconds; whether it lived so long."""
-    with subprocess.Popen(command(name, run, stir), stderr=subprocess.DEVNULL) as process:
+def killed(words, number, after):
+    """Begin and kill after so many seconds; whether it lived so long, and its process group."""
+    with subprocess.Popen(
+        words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    ) as process:
         try:
             process.wait(after)
-            return False
+            return False, process.pid
         except subprocess.TimeoutExpired:
             os.kill(process.pid, SIGNALS[number % len(SIGNALS)])
-            return True
+            return True, process.pid
 
 
-def fault_of(name, run, stir, whole):
-    """What is wrong with a killed run after its step was repeated; "" where nothing is."""
+def on_a_small_disk(words, size):
+    """Begin where no file grows beyond so many bytes; whether that stopped it."""
+
+    def limited():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+
+    done = subprocess.run(words, capture_output=True, text=True, check=False, preexec_fn=limited)
+    if "Traceback" in done.stderr:
+        print(done.stderr, flush=True)
+        return None
+    return done.returncode != 0
+
+
+def fault_of(stage, run, stir, whole):
+    """What is wrong with a stopped run after its stage was repeated; "" where nothing is."""
     before = made(run)
-    again = run.exists() and (run / "run.toml").exists()
-    done = subprocess.run(
-        command(name, run, stir, again=again), capture_output=True, text=True, check=False
-    )
-    if done.returncode:
+    words = command(stage, run, stir, again=True)
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    if done.returncode and stage != "check sbc":
         return f"refused: {done.stderr.strip().splitlines()[-1]}"
     after = made(run)
     if any(after.get(key) != when for key, when in before.items()):
         return "simulated twice"
     if after.keys() != made(whole).keys():
         return "other simulations"
-    one, other = concluded(run, name), concluded(whole, name)
-    same = one.keys() == other.keys() and all(np.array_equal(one[k], other[k]) for k in one)
+    one, other = concluded(stage, run), concluded(stage, whole)
+    same = one.keys() == other.keys() and all(
+        np.array_equal(one[k], other[k], equal_nan=one[k].dtype.kind == "f") for k in one
+    )
     return "" if same else "other numbers"
+
+
+def fault_of_recording(run, group):
+    """What a recording that was killed leaves; "" where nothing is wrong."""
+    until = time.monotonic() + ENDED
+    while time.monotonic() < until:
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            break
+        time.sleep(0.1)
+    else:
+        return "a process goes on"
+    again = run.with_name("another recording")
+    shutil.rmtree(again, ignore_errors=True)
+    done = subprocess.run(command("record", again, None), capture_output=True, check=False)
+    return f"then: {done.stderr.strip().splitlines()[-1]}" if done.returncode else ""
+
+
+def faults(given, folder) -> Iterator[tuple[str, str]]:
+    """Each thing that is wrong: what was stopped, and how it ended."""
+    rng, alive, full = np.random.default_rng(given.seed), 0, 0
+    stir = folder / "stir.nc"
+    bundled = files("bolfi_liquids.data") / "glycerin_v10.nc"
+    with xr.open_dataset(bundled, decode_times=False) as recording:
+        recording.isel(time=slice(0, SAMPLES)).to_netcdf(stir)
+    wholes = {stage: whole_run(stage, stir, folder) for stage in given.stages}
+    print(json.dumps({stage: round(wholes[stage][1], 1) for stage in wholes}), flush=True)
+
+    def fresh(stage):
+        shutil.rmtree(run := folder / "stopped", ignore_errors=True)
+        if (before := folder / f"before {stage}").exists():
+            shutil.copytree(before, run)
+        return run
+
+    for number in range(given.kills):
+        stage = given.stages[number // len(SIGNALS) % len(given.stages)]
+        whole, seconds = wholes[stage]
+        run = fresh(stage)
+        lived, group = killed(command(stage, run, stir), number, rng.uniform(0.5, seconds))
+        alive += lived
+        if stage == "record":
+            fault = fault_of_recording(run, group)
+        else:
+            fault = fault_of(stage, run, stir, whole)
+        if fault:
+            yield f"{stage}, {SIGNALS[number % len(SIGNALS)].name}", fault
+    on_disk = [stage for stage in given.stages if stage != "record"]
+    for number in range(given.disks):
+        stage = on_disk[number % len(on_disk)]
+        run, size = fresh(stage), int(np.exp(rng.uniform(*np.log(SMALL_DISK))))
+        stopped = on_a_small_disk(command(stage, run, stir), size)
+        full += bool(stopped)
+        fault = "traceback" if stopped is None else fault_of(stage, run, stir, wholes[stage][0])
+        if fault:
+            yield f"{stage}, files of {size} bytes", fault
+    print(f"{alive} of {given.kills} killed in time, {full} of {given.disks} stopped by the disk")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--kills", type=int, default=60)
+    parser.add_argument("--disks", type=int, default=10)
+    parser.add_argument("--stages", nargs="+", choices=STAGES, default=STAGES)
     parser.add_argument("--seed", type=int, default=0)
-    given = parser.parse_args()
-    rng, faults, alive = np.random.default_rng(given.seed), [], 0
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        stir = folder / "stir.nc"
-        bundled = files("bolfi_liquids.data") / "glycerin_v10.nc"
-        with xr.open_dataset(bundled, decode_times=False) as recording:
-            recording.isel(time=slice(0, SAMPLES)).to_netcdf(stir)
-        wholes = {stage: run_of(stage, stir, folder) for stage in COMMANDS}
-        for number in range(given.kills):
-            stage = list(COMMANDS)[number // len(SIGNALS) % len(COMMANDS)]
-            whole, seconds = wholes[stage]
-            run = folder / "killed"
-            shutil.rmtree(run, ignore_errors=True)
-            if (before := folder / f"before_{stage}").exists():
-                shutil.copytree(before, run)
-            alive += killed(stage, run, stir, number, rng.uniform(0.5, seconds))
-            if fault := fault_of(stage, run, stir, whole):
-                faults.append(fault)
-                print(f"{stage}, {SIGNALS[number % len(SIGNALS)].name}: {fault}", flush=True)
-    print(f"{alive} of {given.kills} killed; faults: {len(faults)}; {bl.__version__}")
-    return bool(faults)
+        count = 0
+        for what, fault in faults(parser.parse_args(), Path(name)):
+            print(f"{what}: {fault}", flush=True)
+            count += 1
+    print(f"faults: {count}; {bl.__version__}")
+    return bool(count)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 from bolfi_liquids.inference import SimulationBank
-from bolfi_liquids.inference.simulations import Keep
+from bolfi_liquids.inference.simulations import Compute
 from machine import machine
 from numpy.typing import NDArray
 from paper.outcomes import Outcomes, pour_all
@@ -24,11 +24,12 @@ from scipy.ndimage import gaussian_filter1d
 
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.pouring.design import RATE, box_around, joint_prior
-from bolfi_liquids.pouring.landed_pours import LandedPours, Poured, pours_in
+from bolfi_liquids.pouring.design import box_around, joint_prior
+from bolfi_liquids.pouring.landed_pours import Parcels, Poured, pours_in
 from bolfi_liquids.pouring.landing_map import learn_map
 from bolfi_liquids.pouring.spillage import Surface, surface
 from bolfi_liquids.progress import silent
+from bolfi_liquids.simulators import RATE, PourSimulator
 
 DENSITY = 1000.0  # kg/m3
 RATES, TRIED, FINALISTS = 15, 16, 3  # of the direct search
@@ -67,7 +68,7 @@ class Bench:
     """Pours of one posterior, kept in a bank."""
 
     def __init__(self, liquid: Liquid, bank: SimulationBank):
-        self.liquid, self.keep, self.cups = liquid, Keep(bank), bundled_cups()
+        self.liquid, self.compute, self.cups = liquid, Compute(bank=bank), bundled_cups()
         best = {"viscosity": liquid.viscosity, "cohesion": 0.5 * (LEAST_COHESION + 1.0)}
         prior = joint_prior(default_prior(), (), self.cups)
         self.box = box_around(prior, draws(liquid, 4000, 1), best)
@@ -76,7 +77,9 @@ class Bench:
     def by_map(self, pours: int) -> tuple[dict[str, float], float, float]:
         """The action that a map of the first pours chooses, what it states that this spills, and
         the map's error."""
-        made = pours_in(self.box, LandedPours(self.cups, DENSITY), max(POURS), self.keep)
+        made = pours_in(
+            self.box, PourSimulator(self.cups, DENSITY, Parcels()), max(POURS), self.compute
+        )
         first = [job.theta[RATE] for job in self.box.jobs(pours)]
         own = np.isin(made.theta[RATE], first)
         theta = {name: values[own] for name, values in made.theta.items()}
@@ -114,7 +117,7 @@ class Bench:
     def _poured(self, rates: NDArray, count: int, seed: int) -> Surface:
         seeds = np.arange(count) + 1000 * seed
         liquids = Outcomes(draws(self.liquid, count, seed), DENSITY, self.cups, seeds)
-        return surface(pour_all(liquids, rates, self.keep, silent), self.cups)
+        return surface(pour_all(liquids, rates, self.compute, silent), self.cups)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from bolfi_liquids.inference.criticism.verdict_kind import VerdictKind
+from bolfi_liquids.inference.simulations import Compute
 
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.summary import ParameterSummary
@@ -17,7 +18,6 @@ from bolfi_liquids.criticism.source_summary import DifferingWindow, GapSummary, 
 from bolfi_liquids.criticism.summary import CameraNoise, CriticismSummary
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.reporting.frames import Shown, frames_of
-from bolfi_liquids.run.compute import Compute
 from bolfi_liquids.run.run import Run, as_json
 
 BUNDLED = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
@@ -111,7 +111,7 @@ def shown(pour):
 @pytest.fixture(scope="session")
 def frames(shown):
     """What draws of the calibration look like, stirred and poured."""
-    return frames_of(shown, Compute(progress=False))
+    return frames_of(shown, Compute(), progress=False)
 
 
 @pytest.fixture

@@ -6,21 +6,22 @@ from importlib.resources import files
 import pytest
 import tomli_w
 
-from bolfi_liquids.calibration.calibrate import run_record
-from bolfi_liquids.calibration.stir_simulator import stirring_of
+from bolfi_liquids.calibration.calibrate import CalibrationInputs
 from bolfi_liquids.demo import RECORDING, run_demo
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.open import open_recording
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.inputs.settings import CalibrationSettings
 from bolfi_liquids.run.run import RUN_TOML
+from bolfi_liquids.simulators import stir_simulator
 
 
 def of_the_demo(**changes):
     """What `calibrate` notes of the demo's recording, with other settings."""
     recording = open_recording(files("bolfi_liquids.data") / RECORDING)
     settings = replace(CalibrationSettings(), **changes)
-    return run_record(settings, default_prior(), stirring_of([recording], settings.particles))
+    stirring = stir_simulator([recording], settings.particles)
+    return CalibrationInputs(settings, default_prior(), stirring).record()
 
 
 OTHERS = {

@@ -9,9 +9,8 @@ from bolfi_liquids.hardware.vision.frame_measurement import FrameMeasurement
 RIG = bundled_rig()
 WAY = 2.0  # s, down into the cup, and out of it
 HOST = 5000.0  # host time of the robot's time 0
-OFFSET = {"xz": 1000.0123, "yz": 33.0071}  # of the cameras' clocks from the robot's
-DRIFT = {"xz": 2e-5, "yz": -3e-5}
-LATENCY = 0.03
+DRIFT = -2e-5  # by which this computer's clock runs faster than the robot's
+DELAY = {"xz": 0.0323, "yz": 0.0571}  # s, from a picture's exposure to its stamp
 NOISE = np.radians(0.03)
 MARKER_NOISE = 0.05  # px
 COMPLETED = (
@@ -21,6 +20,11 @@ COMPLETED = (
     {"source": "control", "kind": "done", "number": 1},
     {"source": "control", "kind": "left"},
 )
+
+
+def host_time(robot_time):
+    """This computer's time of the robot's [s]."""
+    return HOST + robot_time * (1 + DRIFT)
 
 
 def pivot(robot_time, duration):
@@ -56,12 +60,11 @@ def frames_of(view, until, duration, rng, rate=30.0):
     slope = (x1 - x0) / (y1 - y0) + NOISE * rng.standard_normal(len(times))
     marker = camera.project(top + np.array(RIG.camera(view).marker))
     marker = marker + MARKER_NOISE * rng.standard_normal(marker.shape)
-    stamp = (times + OFFSET[view]) * (1 + DRIFT[view])
+    stamp = host_time(times) + DELAY[view]
     return [
         FrameMeasurement(
             k,
             float(stamp[k]),
-            float(times[k] + HOST + LATENCY + 0.004 * rng.random()),
             *marker[k].tolist(),
             angle=float(np.arctan(slope[k])),
             offset=float(x0[k] - slope[k] * y0[k]),
@@ -85,6 +88,6 @@ def samples_of(until, duration):
             "late": 1e-4 * (k % 5),
         }
         x, y, z = pivot(t, duration)
-        numbers |= {"x": x, "y": y, "z": z, "time": t, "host": HOST + t + 0.001}
+        numbers |= {"x": x, "y": y, "z": z, "time": t, "host": host_time(t) + 0.001}
         rows.append(Sample(**numbers | {"index": k, "stirring": stirring, "runtime_state": 2}))
     return rows

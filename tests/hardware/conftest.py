@@ -1,4 +1,4 @@
-"""The motion loop, its driver and the emulator in this thread, on a clock that the test steps."""
+"""The motion loop, its driver and a controller in this thread, on a clock that the test steps."""
 
 import sys
 from collections.abc import Callable
@@ -7,8 +7,8 @@ from queue import Queue
 
 import numpy as np
 import pytest
+from bolfi_liquids.hardware.arm import Tool
 from bolfi_liquids.hardware.board import SPAWN, Board, Row, Who
-from bolfi_liquids.hardware.emulator.controller import Options
 from bolfi_liquids.hardware.motion.cup_frame import cup_frame
 from bolfi_liquids.hardware.motion.kinematics import inverse
 from bolfi_liquids.hardware.recorder.events import EventLog, read_events
@@ -25,11 +25,12 @@ from bolfi_liquids.hardware.robot.orders import (
     Report,
     Stopped,
 )
-from bolfi_liquids.hardware.safety.limits import Tool, workspace
+from bolfi_liquids.hardware.safety.limits import workspace
 
 sys.path.insert(0, str(Path(__file__).parent))
 from stepped_clock import SteppedClock  # noqa: E402
-from stepped_emulator import SteppedEmulator, library  # noqa: E402
+from ur_controller.controller import Options  # noqa: E402
+from ur_controller.stepped import SteppedController, library  # noqa: E402
 
 LONGEST = 120.0  # s of the stepped clock, after which a test has failed
 
@@ -82,8 +83,8 @@ class SteppedControl:
         moved: Host times of ticks in which the arm moved [s].
     """
 
-    def __init__(self, to: Assignment, emulator: SteppedEmulator):
-        self.emulator, self.clock = emulator, emulator.clock
+    def __init__(self, to: Assignment, clock: SteppedClock, emulator: SteppedController | None):
+        self.emulator, self.clock = emulator, clock
         self.directory = Path(to.directory)
         self.reports: list[Report] = []
         self.rows, self.silent, self.trouble, self.moved = [], set(), {}, []
@@ -159,7 +160,7 @@ class SteppedControl:
             self.links.board.write(who, Row(self.clock.now(), self.trouble.get(who, 0)))
         while not self.recorder.closed and self.recorder.poll():
             self.rows.extend(self.recorder.recv())
-        if not self.emulator.controller.snapshot.resting:
+        if self.emulator is not None and not self.emulator.controller.snapshot.resting:
             self.moved.append(self.clock.now())
 
     def _give_up(self) -> None:
@@ -168,11 +169,11 @@ class SteppedControl:
 
 @pytest.fixture
 def step_emulator(monkeypatch):
-    """Makes a `SteppedEmulator`, and ur_rtde's modules are its clients."""
-    running: list[SteppedEmulator] = []
+    """Makes a `SteppedController`, and ur_rtde's modules are its clients."""
+    running: list[SteppedController] = []
 
     def make(clock: SteppedClock, **options):
-        running.append(emulator := SteppedEmulator(Options(**options), clock))
+        running.append(emulator := SteppedController(Options(**options), clock))
         for module in ("rtde_receive", "rtde_control"):
             monkeypatch.setitem(sys.modules, module, library(emulator))
         return emulator
@@ -183,25 +184,41 @@ def step_emulator(monkeypatch):
 
 
 @pytest.fixture
-def stepped(tmp_path, monkeypatch, step_emulator):
-    """Makes a `SteppedControl` of a rig, a tool, and where that starts in the cup's frame."""
+def at_once(monkeypatch):
+    """The driver's thread does its work when it is started."""
     monkeypatch.setattr(ur, "Thread", AtOnce)
+
+
+@pytest.fixture
+def stepped_loop(monkeypatch):
+    """Makes a `SteppedControl` of an assignment, whose arm goes by the same clock."""
     # the process of the tests keeps its priority
     monkeypatch.setattr(control_loop, "quieten", lambda: None)
     monkeypatch.setattr(control_loop, "hurry", lambda: "normal")
     monkeypatch.setattr(order_queue, "hurry", lambda: "normal")
     running: list[SteppedControl] = []
 
-    def make(rig: Rig, tool: Tool, start, *, armed: bool = True, cameras: bool = False):
-        space = workspace(rig, tool)
-        base = cup_frame(rig.cup).to_base(start)
-        joints = inverse(space.arm, base, space.start, tcp=space.tcp).joints
-        emulator = step_emulator(SteppedClock(), joints=tuple(joints.tolist()), seed=1)
-        probes = base[None] if armed else np.empty((0, 6))
-        to = Assignment(rig, emulator.address, tool, armed, str(tmp_path), probes, cameras)
-        running.append(SteppedControl(to, emulator))
+    def make(to: Assignment, clock: SteppedClock, emulator: SteppedController | None = None):
+        running.append(SteppedControl(to, clock, emulator))
         return running[-1]
 
     yield make
     for one in running:
         one.close()
+
+
+@pytest.fixture
+def stepped(tmp_path, stepped_loop, step_emulator, at_once):
+    """Makes a `SteppedControl` of a rig, a tool, and where that starts in the cup's frame."""
+
+    def make(rig: Rig, tool: Tool, start, *, armed: bool = True, cameras: bool = False):
+        space, clock = workspace(rig, tool), SteppedClock()
+        base = cup_frame(rig.cup).to_base(start)
+        joints = inverse(space.arm, base, space.start, tcp=space.tcp).joints
+        emulator = step_emulator(clock, joints=tuple(joints.tolist()), seed=1)
+        controller = ur.URController(emulator.address)
+        probes = base[None] if armed else np.empty((0, 6))
+        to = Assignment(rig, controller, tool, armed, str(tmp_path), probes, cameras)
+        return stepped_loop(to, clock, emulator)
+
+    return make

@@ -1,26 +1,21 @@
 """The renderer, against formulae written out here."""
 
 import dataclasses
-import json
-import socket
-import threading
+import time
 
 import numpy as np
 import pytest
+from bolfi_liquids.hardware.board import SPAWN
 from bolfi_liquids.hardware.rendering import (
-    CLEAN,
-    CupPlace,
     Look,
-    StreamedWorld,
-    WorldError,
     WorldState,
     exposure_times,
     fault_of,
     prepare,
-    rehearsal_camera,
-    rehearsal_scene,
     render,
 )
+from bolfi_liquids.hardware.rendering.shared_world import ROWS, SharedWorld
+from rendered_scenes import CLEAN, rehearsal_camera, rehearsal_scene
 
 pytest.importorskip("cv2")
 
@@ -139,68 +134,51 @@ def test_a_gripper_out_of_view_leaves_the_backdrop():
     np.testing.assert_array_equal(render(stage, [away], RNG)[:100], stage.backdrop[:100])
 
 
-class Emulator:
-    """Streams the lines that it is told to, then closes."""
-
-    def __init__(self, lines):
-        self._server = socket.create_server(("127.0.0.1", 0))
-        self.port = self._server.getsockname()[1]
-        self._lines, self.close = lines, threading.Event()
-        self._thread = threading.Thread(target=self._serve, daemon=True)
-        self._thread.start()
-
-    def _serve(self):
-        with self._server, self._server.accept()[0] as client:
-            assert json.loads(client.makefile().readline()) == {"command": "stream"}
-            for line in self._lines:
-                client.sendall(line)
-            self.close.wait(10.0)
-
-    def stop(self):
-        self.close.set()
-        self._thread.join(10.0)
+def world_at(host, x=0.0):
+    return SharedWorld(host, WorldState(0.0, np.array([x, 0.2, 0.3]), np.zeros(2)))
 
 
-def line(host, x, stick, time=7.0):
-    fields = {"time": time, "pose": [x, 0.2, 0.3, 0, 0, 0], "stick": stick, "host": host}
-    return (json.dumps(fields) + "\n").encode()
+def test_between_two_states_the_world_is_interpolated_and_the_last_one_stays():
+    world = world_at(10.0, 0.5)
+    world.write(10.1, WorldState(0.2, np.array([0.6, 0.2, 0.3]), np.array([0.2, -0.1])))
+    between = world.state(10.05)
+    np.testing.assert_allclose(between.pivot, [0.55, 0.2, 0.3])
+    np.testing.assert_allclose(between.inclination, [0.1, -0.05])
+    assert between.time == pytest.approx(0.1)
+    assert world.state(99.0).pivot[0] == 0.6 and world.state(0.0).pivot[0] == 0.5
 
 
-def wait_for(world, host, x):
-    for _ in range(500):
-        if world.state(host).pivot[0] == pytest.approx(x, abs=1e-9):
-            return True
-        threading.Event().wait(0.01)
-    return False
+def test_older_states_are_forgotten_and_the_rest_is_in_order():
+    world = world_at(0.0)
+    for k in range(1, 3 * ROWS):
+        world.write(float(k), WorldState(2.0 * k, np.full(3, float(k)), np.zeros(2)))
+    last = 3 * ROWS - 1
+    assert world.state(last - 0.25).time == pytest.approx(2.0 * last - 0.5)
+    # the row that a writer may be about to replace is left out
+    assert world.state(0.0).pivot[0] == last - ROWS + 2
 
 
-def test_streamed_states_are_interpolated_and_the_last_one_stays():
-    emulator = Emulator([line(10.0, 0.5, [0.1, 0.0], 7.0), line(10.1, 0.6, [0.2, 0.0], 7.2)])
-    world = StreamedWorld("127.0.0.1", CupPlace((0.4, 0.2, 0.1)), port=emulator.port)
+def write_until(enough, world):
+    k = 0.0
+    while not enough.is_set():
+        for _ in range(ROWS):
+            k += 1.0
+            world.write(k, WorldState(k, np.full(3, k), np.full(2, k)))
+
+
+@pytest.mark.usefixtures("importable")
+def test_whoever_looks_from_another_process_sees_whole_states_only():
+    world, enough = SharedWorld(0.0, WorldState(0.0, np.zeros(3), np.zeros(2))), SPAWN.Event()
+    writer = SPAWN.Process(target=write_until, args=(enough, world), daemon=True)
+    writer.start()
+    end, times = time.monotonic() + 60.0, set()
     try:
-        assert wait_for(world, 99.0, 0.2)
-        between = world.state(10.05)
-        np.testing.assert_allclose(between.pivot, [0.15, 0.0, 0.2])
-        np.testing.assert_allclose(between.inclination, [0.15, 0.0], atol=1e-12)
-        assert between.time == pytest.approx(7.1)
-        emulator.stop()
-        assert wait_for(world, 99.0, 0.2)
+        while len(times) < 500 and time.monotonic() < end:
+            seen = world.state(np.inf)
+            # all numbers of a state are the same here
+            assert (seen.pivot == seen.time).all() and (seen.inclination == seen.time).all()
+            times.add(seen.time)
     finally:
-        emulator.stop()
-        world.close()
-
-
-def test_the_cup_s_yaw_turns_both_the_pivot_and_the_stick():
-    # the cup's x axis points along the base's y axis
-    place = CupPlace((0.0, 0.0, 0.0), yaw=np.pi / 2)
-    np.testing.assert_allclose(place.pivot(np.array([0.0, 0.3, 0.1])), [0.3, 0.0, 0.1], atol=1e-12)
-    np.testing.assert_allclose(place.inclination(np.array([0.2, 0.1])), [0.1, -0.2], atol=1e-12)
-
-
-def test_a_world_that_nobody_streams_is_refused():
-    with pytest.raises(WorldError, match="start it before"):
-        StreamedWorld("127.0.0.1", CupPlace((0.0, 0.0, 0.0)), port=1, timeout=0.5)
-    silent = Emulator([])
-    with pytest.raises(WorldError, match="no state"):
-        StreamedWorld("127.0.0.1", CupPlace((0, 0, 0)), port=silent.port, timeout=0.2)
-    silent.stop()
+        enough.set()
+        writer.join()
+    assert len(times) == 500

@@ -14,8 +14,8 @@ from bolfi_liquids.hardware.motion.stir_paths import (
     stir,
 )
 from bolfi_liquids.hardware.rig import Rig
+from bolfi_liquids.hardware.rig_checks import MAX_START_AWAY, clearance
 from bolfi_liquids.hardware.rig_file import bundled_rig, checked_rig
-from bolfi_liquids.hardware.rig_geometry import MAX_START_AWAY, clearance
 from bolfi_liquids.hardware.safety.limits import workspace
 
 BUNDLED = bundled_rig()

@@ -25,7 +25,7 @@ def test_an_exception_costs_one_run(tmp_path, prior, observed, simulate):
         stored = bank.get("", theta, int(row["seed"]))
     assert stored is not None and stored.error is not None
     assert re.fullmatch(
-        r"FloatingPointError: blew up \(test_failures\.py, line \d+\)", stored.error
+        r"FloatingPointError: blew up \(test_failures\.py, line \d+\)", stored.error.text
     )
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from bolfi_liquids.inference.simulations.failures import raised
 
 from bolfi_liquids import inference
 
@@ -56,7 +57,8 @@ def test_objects_tell_what_they_hold(fit, prior, observed):
     engine = inference.Bolfi(prior, observed)
     engine.ask(3)
     with inference.SimulationBank() as bank:
-        bank.put("mine", {"a": 1.0}, 0, inference.simulations.Simulation(None, "<b>", 0.0))
+        failed = inference.simulations.Simulation(None, raised(OSError("<b>")), 0.0)
+        bank.put("mine", {"a": 1.0}, 0, failed)
         shown = [(fit, "9"), (engine, "3 asked"), (bank, "1 simulations, 1 failed")]
         for value, part in shown:
             assert part in repr(value) and "<table>" in value._repr_html_()

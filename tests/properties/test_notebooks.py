@@ -6,7 +6,7 @@ import pytest
 
 TESTS = Path(__file__).parents[1]
 NOTEBOOKS = sorted((TESTS.parent / "notebooks").glob("*.ipynb"))
-RECORDS = {"dry_run"}  # on the emulator, which must keep time
+RECORDS = {"dry_run"}  # with an emulated arm, which must keep time
 LONGEST = 600  # s after which a cell hangs, on a slow computer that does something else as well
 
 

@@ -11,6 +11,7 @@ import tomllib
 from importlib.resources import files
 from itertools import count
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -24,6 +25,9 @@ import bolfi_liquids as bl
 from bolfi_liquids import hardware
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.run.run import Run
+
+sys.path.append(str(Path(__file__).parents[1] / "hardware"))
+from ur_controller.process import ControllerProcess  # noqa: E402
 
 # a dry run of them looks at the arm, whose controller may not be silent for long
 LOOKS = ("record", "pour")
@@ -42,7 +46,6 @@ OF_A_RIG = {
     "pour": ["RUN", "--execute"],
     "rig check": [],
     "rig calibrate-cameras": ["--boards", "BOARDS"],
-    "rig emulate": ["--address", "TAKEN"],
 }
 
 
@@ -83,8 +86,8 @@ def boards(pictures, tmp_path_factory):
 @pytest.fixture(scope="module")
 def emulator():
     rig = hardware.bundled_rig()
-    with hardware.emulated(rig, hardware.motion.above_cup(rig)) as running:
-        yield running.emulator
+    with ControllerProcess.at_pose(rig, hardware.motion.above_cup(rig)) as running:
+        yield running
 
 
 @pytest.fixture
@@ -156,9 +159,7 @@ def test_every_command_is_known_here():
 def test_there_are_no_other_entry_points():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert project["scripts"] == {"bolfi-liquids": "bolfi_liquids.cli.app:main"}
-    assert {name for name in SOURCES if name.endswith("__main__.py")} == {
-        "hardware/emulator/__main__.py"
-    }
+    assert not [name for name in SOURCES if name.endswith("__main__.py")]
 
 
 def gives(argument, path):
@@ -174,7 +175,7 @@ def sources(pattern):
 
 def test_one_file_knows_the_library_that_moves_arms():
     assert sources(r"rtde_control\"\)|import rtde_control") == {"hardware/robot/ur.py"}
-    assert sources(r"\bURArm\(") == {"hardware/robot/ur.py", "hardware/robot/preparation.py"}
+    assert sources(r"\bURArm\(") == {"hardware/robot/ur.py"}
     armed = {name for name, path in SOURCES.items() if gives("armed", path)}
     # the others hand it on
     control = {f"hardware/robot/control_{name}.py" for name in ("loop", "process")}
@@ -192,7 +193,6 @@ def test_unarmed_command_moves_nothing(words, rig_file, poured_run, boards, emul
         "RUN": poured_run,
         "BOARDS": boards,
         "CALIBRATED": rig_file.parent / "c",
-        "TAKEN": emulator.address,
     }
     arguments = [names.get(one, one) for one in OF_A_RIG[words]]
     # the sentence is typed all the same
@@ -262,13 +262,12 @@ def test_the_sentence_does_move_the_arm(whole, poured_run, tmp_path):
     rig = hardware.bundled_rig()
     chosen = bl.Pour.open(poured_run).chosen
     ready = hardware.motion.ready_to_pour(rig, chosen.distance, 0.2)
-    with hardware.emulated(rig, ready, tool="pouring") as running:
+    with ControllerProcess.at_pose(rig, ready, "pouring") as running:
         text = (files("bolfi_liquids.hardware.data") / "rig.toml").read_text()
         path = tmp_path / "rig.toml"
-        address = running.emulator.address
-        path.write_text(text.replace('host = "127.0.0.1"', f'host = "{address}"'))
+        path.write_text(text.replace('host = "127.0.0.1"', f'host = "{running.address}"'))
         command = ["pour", poured_run, "--execute", "--rig", path, "--arm"]
-        motions = running.emulator.admin.motions
+        motions = running.admin.motions
         until = None if whole else lambda: motions() > 0
         status, said = in_a_terminal(*command, typed=CONFIRMATION, until=until)
         assert (status == 0) == whole, said
@@ -281,17 +280,26 @@ def test_python_asks_for_the_same(tmp_path):
         bl.record(rig, out=tmp_path / "a")
     with pytest.raises(ValueError, match="armed without a confirmation"):
         hardware.SessionSetup(rig, tmp_path / "b", armed=True)
-    with pytest.raises(ValueError, match="without an emulated arm"):
-        hardware.SessionSetup(
-            rig,
-            tmp_path / "c",
-            armed=True,
-            rehearsal=True,
-            confirmation=hardware.confirm("plan", CONFIRMATION, rig.robot.host),
-        )
     with pytest.raises(TypeError, match="comes from confirm"):
-        Confirmation(object(), "plan", "127.0.0.1", emulated=False)
+        Confirmation(object(), "plan", "127.0.0.1")
     with pytest.raises(ValueError, match="ask="):
         bl.execute_pour(tmp_path, rig)
-    with pytest.raises(ValueError, match="no emulator answers"):
-        hardware.confirm_emulated("plan", "192.168.1.10")
+
+
+class Lookalike(NamedTuple):
+    """A controller that calls itself emulated, and moves who knows what."""
+
+    address: str = "emulated"
+    emulated: bool = True
+
+
+def test_one_kind_of_arm_alone_moves_without_the_sentence(tmp_path):
+    rig = hardware.bundled_rig()
+    mine = hardware.emulated(rig, hardware.motion.above_cup(rig)).controller
+    assert hardware.SessionSetup(rig, tmp_path, mine, armed=True).rehearsal
+    for other in (Lookalike(), hardware.URController("127.0.0.1"), None):
+        with pytest.raises(ValueError, match="armed without a confirmation"):
+            hardware.SessionSetup(rig, tmp_path, other, armed=True)
+        # nor do its guards bear what only an emulated arm may bear
+        setup = hardware.SessionSetup(rig, tmp_path, other)
+        assert not setup.rehearsal and setup.guarded_rig().limits == rig.limits

@@ -1,4 +1,4 @@
-"""A whole recording, and a whole online calibration, on the emulator and rendered cameras.
+"""A whole recording, and a whole online calibration, with an emulated arm and rendered cameras.
 
 The recording is the one that the guide makes, by its own words.
 """
@@ -18,7 +18,6 @@ import bolfi_liquids as bl
 from bolfi_liquids import hardware, models
 from bolfi_liquids.inputs.open import read_recording
 
-pytest.importorskip("rtde_control")
 pytest.importorskip("cv2")
 
 pytestmark = pytest.mark.punctual

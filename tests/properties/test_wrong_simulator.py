@@ -13,11 +13,12 @@ from scipy.stats import chi2
 
 import bolfi_liquids as bl
 from bolfi_liquids.criticism.pour_noise import PourNoise
-from bolfi_liquids.criticism.pours import Pouring
+from bolfi_liquids.criticism.pours import Fractions
 from bolfi_liquids.inputs.bundled import bundled_pours
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.pour_table import open_pours
 from bolfi_liquids.reporting.warnings import Results, warnings_of
+from bolfi_liquids.simulators import PourSimulator
 
 WRONG = Path(__file__).parents[1] / "data" / "wrong_simulator"
 SETTINGS = {"budget": 12, "batch": 4, "chains": 2, "draws": 200, "sampler": "emcee"}
@@ -63,7 +64,8 @@ def p_value(table, hold):
     """
     cups = bundled_cups()
     cups = cups.model_copy(update={"pour": cups.pour.model_copy(update={"hold": hold})})
-    pouring = Pouring(table.angular_velocity, table.distance, cups, GLYCERIN_DENSITY)
+    actions = Fractions(table.angular_velocity, table.distance)
+    pouring = PourSimulator(cups, GLYCERIN_DENSITY, actions)
     missed = (table.observed - pouring.simulate(GLYCERIN, np.array([1]))[0]).ravel()
     pours = len(table.distance)
     at = SimpleNamespace(channel=np.tile(np.arange(pours), 2), sample=np.repeat([0, 1], pours))

@@ -2,9 +2,10 @@
 
     python tests/benchmarks/hardware/faults.py --times 20 --out faults.jsonl
 
-Each run has an emulator, the real client, and a whole session whose main process is a process of
-its own. A fault is injected at a random time during motion; a watcher that reads the emulator's
-admin port says when the arm was at rest, and that it stayed so. The table holds the worst run.
+Each run has an emulated controller, the real client, and a whole session whose main process is a
+process of its own. A fault is injected at a random time during motion; a watcher that reads the
+controller's admin port says when the arm was at rest, and that it stayed so. The table holds the
+worst run.
 It takes an hour, on a computer that does nothing else; `--out` keeps each run, and goes on there.
 """
 
@@ -23,16 +24,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bolfi_liquids.hardware.emulator.admin_client import Admin
-from bolfi_liquids.hardware.emulator.process import EmulatorProcess
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
-from bolfi_liquids.hardware.motion.kinematics import inverse
 from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.recorder.events import read_events
 from bolfi_liquids.hardware.recorder.outcome import outcome
 from bolfi_liquids.hardware.recorder.sample import SAMPLES
-from bolfi_liquids.hardware.safety.limits import workspace
 from faulty_session import small_rig
+
+sys.path.append(str(Path(__file__).parents[2] / "hardware"))
+from ur_controller.admin_client import Admin  # noqa: E402
+from ur_controller.process import ControllerProcess  # noqa: E402
 
 WATCHED = 2.0  # s after a fault, in which nothing may restart
 LOST = 1.0  # s of the recording before a fault that may be missing
@@ -187,12 +187,9 @@ def run_fault(name: str, seed: int, latest: float) -> Result:
 def _run_once(name: str, seed: int, latest: float) -> Result:
     chance = random.Random(f"{name} {seed}")
     rig = small_rig()
-    space = workspace(rig, "stirring")
-    start = cup_frame(rig.cup).to_base(stir(rig).pose[0])
-    joints = inverse(space.arm, start, space.start, tcp=space.tcp).joints
     with (
         tempfile.TemporaryDirectory() as directory,
-        EmulatorProcess.start(joints=joints) as emulator,
+        ControllerProcess.at_pose(rig, stir(rig).pose[0]) as emulator,
     ):
         script = Path(__file__).with_name("faulty_session.py")
         command = [sys.executable, str(script), directory, emulator.address]

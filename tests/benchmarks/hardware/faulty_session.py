@@ -2,7 +2,8 @@
 
     python faulty_session.py DIRECTORY ADDRESS
 
-It stirs with the emulated arm at ADDRESS, and prints its processes' ids as JSON once the arm moves.
+It stirs with the arm of the controller at ADDRESS, and prints its processes' ids as JSON once that
+moves.
 """
 
 import json
@@ -19,7 +20,8 @@ from bolfi_liquids.hardware.recorder.sample import SAMPLES
 from bolfi_liquids.hardware.rig import Rig
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.robot.orders import Follow
-from bolfi_liquids.hardware.session.confirmation import confirm_emulated, describe
+from bolfi_liquids.hardware.robot.ur import URController
+from bolfi_liquids.hardware.session.confirmation import CONFIRMATION, confirm, describe
 from bolfi_liquids.hardware.session.session import Session, SessionStopped
 from bolfi_liquids.hardware.session.setup import SessionSetup
 
@@ -47,7 +49,7 @@ class NoiseCamera:
             self._image = self._random.integers(0, 255, IMAGE_SIZE[::-1], dtype=np.uint8)
         self._index += 1
         now = time.monotonic()
-        return Frame(self._index, now, now, self._image)
+        return Frame(self._index, now, self._image)
 
     def close(self) -> None:
         """Nothing to let go."""
@@ -84,9 +86,9 @@ def run_main(directory: Path, address: str) -> None:
     rig = small_rig()
     plan = [stir(rig, 3)]
     make = {"xz": MakeCamera(directory), "yz": MakeCamera(Path("/nonexistent"))}
-    leave = confirm_emulated(describe(plan, rig, "stirring"), address)
-    recording = directory / "recording"
-    setup = SessionSetup(rig, recording, address, make, armed=True, confirmation=leave, plan=plan)
+    arm, recording = URController(address), directory / "recording"
+    leave = confirm(describe(plan, rig, "stirring"), CONFIRMATION, address)
+    setup = SessionSetup(rig, recording, arm, make, armed=True, confirmation=leave, plan=plan)
     with Session(setup) as session:
         session.pose()
         session.follow(plan[0])

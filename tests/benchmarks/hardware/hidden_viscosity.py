@@ -2,7 +2,7 @@
 
     python tests/benchmarks/hardware/hidden_viscosity.py --out DIRECTORY
 
-Each viscosity is recorded by the real client, emulator and rendered cameras, and calibrated as
+Each viscosity is recorded by the emulated arm and rendered cameras, and calibrated as
 `calibrate` does it. What DIRECTORY holds already is not made again, so an interrupted call goes on.
 A session that this computer was too busy for is repeated; how often is printed.
 """

@@ -9,20 +9,15 @@ would give them, so that the measurement follows the stick as it does on the rig
 import argparse
 import sys
 import time
+from pathlib import Path
 
 import cv2
 import numpy as np
-from bolfi_liquids.hardware.rendering import (
-    Look,
-    WorldState,
-    fault_of,
-    prepare,
-    rehearsal_camera,
-    rehearsal_scene,
-    render,
-    stick_view,
-)
+from bolfi_liquids.hardware.rendering import Look, WorldState, fault_of, prepare, render
 from bolfi_liquids.hardware.vision import Frame, FrameMeter
+
+sys.path.append(str(Path(__file__).parents[2] / "hardware"))
+from rendered_scenes import rehearsal_camera, rehearsal_scene, stick_view  # noqa: E402
 
 BAR = 5.0  # ms, for 95 % of the frames
 LOOK = Look()
@@ -42,7 +37,7 @@ def pictures(view: str, count: int) -> list[Frame]:
         pivot = np.array([REACH * np.cos(0.3 * turn), REACH * np.sin(0.3 * turn), HEIGHT])
         fault = fault_of(at, LOOK.faults, stage.area, 0)
         state = WorldState(at / RATE, pivot, TILT * np.array([np.sin(turn), np.cos(turn)]))
-        frames.append(Frame(at, at / RATE, at / RATE, render(stage, [state] * 3, rng, fault)))
+        frames.append(Frame(at, at / RATE, render(stage, [state] * 3, rng, fault)))
     return frames
 
 

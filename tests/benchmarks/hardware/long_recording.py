@@ -1,8 +1,8 @@
-"""Ten minutes of recording on the emulator: lost samples, memory, open files, loop jitter.
+"""Ten minutes of recording with the emulated arm: lost samples, memory, open files, loop jitter.
 
     python tests/benchmarks/hardware/long_recording.py --minutes 10
 
-The real client, the emulator, two rendered cameras at 640x480 and all processes of a session. What
+The emulated arm, two rendered cameras at 640x480 and all processes of a session. What
 they hold is looked at every few seconds; growth is that of a line through what was seen.
 """
 

@@ -24,11 +24,11 @@ from bolfi_liquids import hardware as paths
 sys.path.insert(0, str(Path(__file__).parent))
 
 from bolfi_liquids.inference import criticism
+from bolfi_liquids.inference.simulations import Compute
 from kept import keep, results
 
 from bolfi_liquids import inference, models
 from bolfi_liquids.calibration.baseline import Clean, clean_residuals, usual_for
-from bolfi_liquids.calibration.stir_simulator import Stirring, stirring_of
 from bolfi_liquids.calibration.stirs import (
     camera_noise,
     effects_of,
@@ -36,10 +36,11 @@ from bolfi_liquids.calibration.stirs import (
     stir_experiment,
 )
 from bolfi_liquids.criticism.pour_noise import REPEATABILITY_SD
-from bolfi_liquids.criticism.pours import Pouring
+from bolfi_liquids.criticism.pours import Fractions
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.inputs.recording import Recording, Trajectory
 from bolfi_liquids.inputs.settings import CriticismSettings
+from bolfi_liquids.simulators import PourSimulator, StirSimulator, stir_simulator
 
 RIG = {
     "cup_radius": 0.04,
@@ -125,7 +126,7 @@ def _criticised_stirs(
     star, circle = (_record(path, truth, rng) for path in PATHS)
 
     def experiment(recording: Recording, cameras: criticism.AutoregressiveNoise):
-        stirring = stirring_of([recording], MODEL)
+        stirring = stir_simulator([recording], MODEL)
         name = recording.path.stem
         return stir_experiment(stirring, cameras, usual_for(stirring, usual), name)
 
@@ -135,7 +136,7 @@ def _criticised_stirs(
         effects_of("stir"),
         held_out=[experiment(circle, held_out_noise(circle, [star]))],
         plan=CriticismSettings().stir_plan,
-        keeping=criticism.Keeping(bank),
+        bank=bank,
     )
 
 
@@ -143,7 +144,7 @@ def _record(path: str, truth: dict, rng: np.random.Generator) -> Recording:
     """A simulated stir with cameras' noise."""
     gripper = Trajectory(*PATHS[path])
     recording = _recording(path, np.zeros((len(gripper.time), 2)))
-    own = Stirring((recording,), (models.StirSetup.from_recording(recording, particles=DATA),))
+    own = StirSimulator((recording,), (models.StirSetup.from_recording(recording, particles=DATA),))
     theta = {name: np.array([value]) for name, value in truth.items()}
     angles = own.simulate(theta, rng.integers(2**31, size=1))[0]
     noise = rng.normal(size=angles.shape) * NOISE
@@ -174,7 +175,8 @@ def _clean(bank: inference.SimulationBank) -> list[Clean]:
         MODEL,
         default_prior(),
         effects_of("stir"),
-        keeping=criticism.Keeping(bank),
+        compute=Compute(batch=4, bank=bank),
+        report=lambda *_: None,
     )
 
 
@@ -192,7 +194,7 @@ def _criticised_pours(
         effects_of("pour"),
         held_out=[_poured(ACTIONS + [30.0, 0.3], truth, rng)],
         plan=CriticismSettings().pour_plan,
-        keeping=criticism.Keeping(bank),
+        bank=bank,
     )
 
 
@@ -201,7 +203,8 @@ def _poured(actions: np.ndarray, truth: dict, rng: np.random.Generator) -> criti
 
     rate, distance = np.radians(actions[:, 0]), actions[:, 1] / 100.0
     cups = bundled_cups()
-    pouring = Pouring(rate, distance, cups, RIG["liquid_density"])
+    actions = Fractions(rate, distance)
+    pouring = PourSimulator(cups, RIG["liquid_density"], actions)
     liquid = models.Liquid(truth["viscosity"], truth["cohesion"], density=RIG["liquid_density"])
     made = models.pour(
         liquid,

@@ -72,7 +72,8 @@ def examine(one: Set) -> dict:
         PRIOR,
         EXTENSIONS,
         held_out=[experiment(SECOND, "other star", second, first)],
-        keeping=criticism.Keeping(batch=64, seed=seed),
+        batch=64,
+        seed=seed,
     )
     return {
         "effect": effect,

@@ -12,20 +12,19 @@ from typing import Any
 
 import numpy as np
 from bolfi_liquids.inference import Bolfi, Fit, Prior, SimulationBank, engine_version
-from bolfi_liquids.inference.simulations import Keep
+from bolfi_liquids.inference.simulations import Compute
+from bolfi_liquids.inference.types import Simulator
 from bolfi_liquids.models import Cups
 from numpy.typing import NDArray
 
 from bolfi_liquids import models
 from bolfi_liquids.calibration.draws import pick_draws
 from bolfi_liquids.calibration.engine_fit import engine_options
-from bolfi_liquids.calibration.stir_simulator import Stirring
 from bolfi_liquids.checks.sbc_pipelines import SAMPLING, SampleNoise
 from bolfi_liquids.inputs.prior import describe_prior
 from bolfi_liquids.inputs.settings import MIN_SIMULATIONS, PAPER_RULES
-from bolfi_liquids.progress import Simulate
-from bolfi_liquids.run.fluid_simulator import FluidSimulator
 from bolfi_liquids.seeds import generator
+from bolfi_liquids.simulators import FluidSimulator, StirSimulator
 
 from .kept_simulator import keeping
 from .phases import Phase
@@ -49,7 +48,7 @@ class ByStirring:
         bank: Where finished simulations are kept.
     """
 
-    stirring: Stirring
+    stirring: StirSimulator
     prior: Prior
     surrogate: str
     budgets: tuple[int, ...]
@@ -62,8 +61,8 @@ class ByStirring:
     def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
         stirring = self.stirring
         with SimulationBank(self.bank) as bank:
-            keep = Keep(bank, stirring.identity, BATCH)
-            simulate = keeping(stirring.simulate, stirring.observed.shape, keep)
+            compute, shape = Compute(bank=bank, batch=BATCH), stirring.observed.shape
+            simulate = keeping(stirring.simulate, shape, compute, stirring.identity)
             clean = simulate(truth, np.array([seed]))[0]
             engine = Bolfi(
                 self.prior,
@@ -108,8 +107,8 @@ class ByPouring(FluidSimulator):
         rules: dict[str, Any] = {**PAPER_RULES}
         with SimulationBank(self.bank) as bank:
             identity = json.dumps(["training pour", *self._pour], sort_keys=True)
-            keep = Keep(bank, identity, BATCH)
-            simulate = keeping(self._spilled, (1,), keep)
+            compute = Compute(bank=bank, batch=BATCH)
+            simulate = keeping(self._spilled, (1,), compute, identity)
             engine = Bolfi(
                 self.prior,
                 simulate(truth, np.array([seed]))[0],
@@ -149,7 +148,7 @@ def _made_by(prior: Prior) -> list[Any]:
     return [*learned_by, SAMPLING, DRAWS_EACH, CAMERA_NOISE.sd, DENSITY]
 
 
-def after_each(engine: Bolfi, simulate: Simulate, budgets: Sequence[int]) -> Iterator[Fit]:
+def after_each(engine: Bolfi, simulate: Simulator, budgets: Sequence[int]) -> Iterator[Fit]:
     """The fits of one search after each number of simulations, ascending.
 
     Points are asked in batches that end at each budget, so the budgets affect the points slightly.

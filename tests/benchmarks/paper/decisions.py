@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from bolfi_liquids.inference import Prior
-from bolfi_liquids.inference.simulations import Keep
+from bolfi_liquids.inference.simulations import Compute
 from bolfi_liquids.models import Cups
 from numpy.typing import NDArray
 
@@ -62,7 +62,7 @@ def execute(
     truths: Truths,
     actions: Iterable[Iterable[Action]],
     landing_map: LandingMap,
-    keep: Keep,
+    compute: Compute,
     advance: Advance,
 ) -> list[NDArray[np.float64]]:
     """Spilled fraction of each action, the mean over seeds that nothing else uses.
@@ -71,14 +71,14 @@ def execute(
         truths: n liquids.
         actions: Those of each.
         landing_map: Its cups are poured.
-        keep: Where pours are made and kept.
+        compute: Where pours are made and kept.
         advance: Called after each truth.
     """
     spilled = []
     for at, chosen in enumerate(actions):
         theta = {name: float(values[at]) for name, values in truths.theta.items()}
         outcomes = executions(theta, DENSITY, landing_map.cups, int(truths.seed[at]))
-        spilled.append(spilled_by(outcomes, list(chosen), keep))
+        spilled.append(spilled_by(outcomes, list(chosen), compute))
         advance(1)
     return spilled
 
@@ -104,10 +104,12 @@ def executions(
     return Outcomes(tiled, density, cups, seeds)
 
 
-def spilled_by(outcomes: Outcomes, actions: Sequence[Action], keep: Keep) -> NDArray[np.float64]:
+def spilled_by(
+    outcomes: Outcomes, actions: Sequence[Action], compute: Compute
+) -> NDArray[np.float64]:
     """Spilled fraction of each action, the mean over the outcomes' seeds."""
     rates = np.unique([action["angular_velocity"] for action in actions])
-    made = pour_all(outcomes, rates, keep, silent)
+    made = pour_all(outcomes, rates, compute, silent)
     return np.array([_spilled(made, action) for action in actions])
 
 

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from bolfi_liquids.models import Cups
@@ -15,9 +15,9 @@ from bolfi_liquids.drawing import INK, new_figure, styled
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring.spillage import DISTANCE_STEP, landing_sd
 from bolfi_liquids.progress import progress_bar
-from bolfi_liquids.run.fluid_simulator import FluidSimulator
 from bolfi_liquids.run.simulations import simulate_kept
 from bolfi_liquids.seeds import simulation_seeds
+from bolfi_liquids.simulators import FluidSimulator
 
 from .figure import Drawn
 from .phases import Phase
@@ -100,9 +100,9 @@ def _regrets(shared: SharedSimulations, lips: NDArray) -> NDArray[np.float64]:
             )
             poured = Poured(cups)
             rates = np.geomspace(*cups.angular_velocity_range, TURN_RATES)
-            keep = shared.keep._replace(identity=poured.identity, batch=1)
+            compute = replace(shared.compute, batch=1)
             theta = {"angular_velocity": rates}
-            made = simulate_kept(poured.simulate, theta, [0] * TURN_RATES, keep, advance=advance)
+            made = simulate_kept(poured, theta, [0] * TURN_RATES, compute, advance=advance)
             rows.append(_regret(made.signals, cups))
     return np.stack(rows)
 

@@ -3,23 +3,25 @@
 from collections.abc import Mapping
 
 import numpy as np
-from bolfi_liquids.inference.simulations import Keep, jobs, run_missing, stacked
+from bolfi_liquids.inference.simulations import Compute, jobs, run_missing, stacked
+from bolfi_liquids.inference.types import Simulator
 from numpy.typing import NDArray
 
-from bolfi_liquids.progress import Simulate
 
-
-def keeping(simulate: Simulate, shape: tuple[int, ...], keep: Keep) -> Simulate:
+def keeping(
+    simulate: Simulator, shape: tuple[int, ...], compute: Compute, identity: str = ""
+) -> Simulator:
     """`simulate`, but for what the bank holds; what is simulated is put there.
 
     Args:
         simulate: As given to `inference.fit`.
         shape: Of a signal; a failed run's is NaN.
-        keep: Where simulations are made and kept.
+        compute: Where simulations are made and kept.
+        identity: The simulator's name in the bank.
     """
 
     def kept(theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
-        results = run_missing(simulate, jobs(theta, seeds), keep, shape)
+        results = run_missing(simulate, jobs(theta, seeds), compute, shape, identity=identity)
         return stacked(results, shape)
 
     return kept

@@ -5,18 +5,18 @@ from pathlib import Path
 import numpy as np
 from bolfi_liquids.models import Cups
 
-from bolfi_liquids.calibration.stir_simulator import Stirring, stirring_of
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.inputs.recording import Recording
 from bolfi_liquids.inputs.strokes import strokes
+from bolfi_liquids.simulators import StirSimulator, stir_simulator
 
 from .calibrations import ByPouring, ByStirring, Learner
 from .study_size import Scale
 
 
 def by_stirring_and_pouring(cups: Cups, scale: Scale, bank: str | Path) -> dict[str, Learner]:
-    """Stirring with either surrogate, and pouring as the paper's reference does.
+    """StirSimulator with either surrogate, and pouring as the paper's reference does.
 
     Args:
         cups: Of training pour and task.
@@ -34,7 +34,7 @@ def by_stirring_and_pouring(cups: Cups, scale: Scale, bank: str | Path) -> dict[
 
 
 def after_strokes(scale: Scale, bank: str | Path) -> dict[str, Learner]:
-    """Stirring that ends after each number of strokes; see `by_stirring_and_pouring`."""
+    """StirSimulator that ends after each number of strokes; see `by_stirring_and_pouring`."""
     prior, whole = default_prior(), bundled_recording("water")
     return {
         str(number): ByStirring(
@@ -56,5 +56,5 @@ def until_stroke(recording: Recording, number: int) -> Recording:
     return recording.first(int(np.flatnonzero(found[number])[-1]) + 1)
 
 
-def _star(recording: Recording, scale: Scale) -> Stirring:
-    return stirring_of([recording], scale.drawn_particles)
+def _star(recording: Recording, scale: Scale) -> StirSimulator:
+    return stir_simulator([recording], scale.drawn_particles)

@@ -2,10 +2,10 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from bolfi_liquids.inference.simulations import Keep
+from bolfi_liquids.inference.simulations import Compute
 from bolfi_liquids.models import Cups
 from numpy.typing import NDArray
 
@@ -13,8 +13,8 @@ from bolfi_liquids import models
 from bolfi_liquids.inputs.prior import split_parameters
 from bolfi_liquids.pouring.spillage import FRACTIONS, Profiles, reachable_distances
 from bolfi_liquids.progress import Advance
-from bolfi_liquids.run.fluid_simulator import FluidSimulator
 from bolfi_liquids.run.simulations import simulate_kept
+from bolfi_liquids.simulators import FluidSimulator
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Outcomes(FluidSimulator):
         return json.dumps(["profiles", *made_of], sort_keys=True)
 
 
-def pour_all(outcomes: Outcomes, rates: NDArray, keep: Keep, advance: Advance) -> Profiles:
+def pour_all(outcomes: Outcomes, rates: NDArray, compute: Compute, advance: Advance) -> Profiles:
     """Pour every liquid at every angular velocity [rad/s]; what the bank holds is not repeated.
 
     Those at which a pour failed are left out.
@@ -79,13 +79,13 @@ def pour_all(outcomes: Outcomes, rates: NDArray, keep: Keep, advance: Advance) -
     Args:
         outcomes: The liquids and seeds.
         rates: Angular velocities [rad/s], shape (W,).
-        keep: Where pours are made and kept; its identity and batch are not used.
+        compute: Where pours are made and kept; its batch is not used.
         advance: Called with 1 for each angular velocity.
 
     Raises:
         RuntimeError: Pours failed at all of them.
     """
-    keep = keep._replace(identity=outcomes.identity, batch=1)
+    compute = replace(compute, batch=1)
     theta = {"angular_velocity": rates}
-    made = simulate_kept(outcomes.simulate, theta, [0] * len(rates), keep, advance=advance)
+    made = simulate_kept(outcomes, theta, [0] * len(rates), compute, advance=advance)
     return Profiles(rates[made.places], outcomes.distances, made.signals)

@@ -7,7 +7,7 @@ from functools import cached_property, partial
 from pathlib import Path
 
 from bolfi_liquids.inference import SimulationBank
-from bolfi_liquids.inference.simulations import Keep
+from bolfi_liquids.inference.simulations import Compute
 from xarray import Dataset
 
 from bolfi_liquids.calibration.calibrate import calibrate
@@ -15,11 +15,12 @@ from bolfi_liquids.calibration.result import Calibration
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.pouring.landed_pours import LandedPours
+from bolfi_liquids.pouring.landed_pours import Parcels
 from bolfi_liquids.pouring.landing_map import LandingMap, map_of_prior
 from bolfi_liquids.progress import progress_bar
 from bolfi_liquids.run.provenance import generations
 from bolfi_liquids.run.run import SIMULATIONS
+from bolfi_liquids.simulators import PourSimulator
 
 from .learners import after_strokes, by_stirring_and_pouring
 from .sticky_study import Stuck, spilled_where_it_sticks
@@ -45,30 +46,30 @@ class SharedSimulations:
     executor: Executor | None = None
 
     @property
-    def keep(self) -> Keep:
+    def compute(self) -> Compute:
         """Where simulations are made and kept."""
-        return Keep(self.bank, executor=self.executor)
+        return Compute(bank=self.bank, executor=self.executor)
 
     @cached_property
     def landing_map(self) -> LandingMap:
         """Of all liquids and the bundled cups, by which actions are chosen."""
         count = self.scale.pours
         with progress_bar("pouring", count, shown=True) as advance:
-            pours = LandedPours(bundled_cups(), DENSITY)
-            return map_of_prior(default_prior(), pours, count, self.keep, advance)
+            pours = PourSimulator(bundled_cups(), DENSITY, Parcels())
+            return map_of_prior(default_prior(), pours, count, self.compute, advance)
 
     @cached_property
     def study(self) -> Dataset:
         """Spillage after stirring and after pouring; see `spillage_study`."""
         cups, bank = self.landing_map.cups, self.out / SIMULATIONS
         learners = by_stirring_and_pouring(cups, self.scale, bank)
-        return spillage_study(learners, self.landing_map, self.scale, self.keep)
+        return spillage_study(learners, self.landing_map, self.scale, self.compute)
 
     @cached_property
     def strokes(self) -> Dataset:
         """The same after stirring for some strokes only."""
         learners = after_strokes(self.scale, self.out / SIMULATIONS)
-        return spillage_study(learners, self.landing_map, self.scale, self.keep)
+        return spillage_study(learners, self.landing_map, self.scale, self.compute)
 
     def begin_sticky(self) -> None:
         """Start the sticky liquids in the pool: they take longest and depend on nothing else."""

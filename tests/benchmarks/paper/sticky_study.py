@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from bolfi_liquids.inference.simulations import Keep
+from bolfi_liquids.inference.simulations import Compute
 
 from bolfi_liquids.calibration.calibrate import calibrate
 from bolfi_liquids.criticism.criticise import criticise
@@ -74,8 +74,8 @@ def spilled_where_it_sticks(out: Path, runs: Path, scale: Scale, number: int) ->
     rehearsed = executions(truth.theta, density, cups, truth.seed, Phase.REHEARSAL)
     rates = np.geomspace(*cups.angular_velocity_range, scale.rates)
     with Run(out, {}).bank() as bank:
-        keep = Keep(bank)
-        known = surface(pour_all(rehearsed, rates, keep, silent), cups).least("mean")
+        compute = Compute(bank=bank)
+        known = surface(pour_all(rehearsed, rates, compute, silent), cups).least("mean")
         actions = [before.chosen.action, after.chosen.action, known]
-        spilled = [*spilled_by(flows, actions[:1], keep), *spilled_by(sticks, actions, keep)]
+        spilled = [*spilled_by(flows, actions[:1], compute), *spilled_by(sticks, actions, compute)]
     return Stuck(truth, spilled, ", ".join(criticism.effects))

@@ -1,9 +1,10 @@
 """Spillage after calibrating in several ways, on truths that are known."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
-from bolfi_liquids.inference.simulations import Keep, jobs, run_missing
+from bolfi_liquids.inference.simulations import Compute, jobs, run_missing
 from numpy.typing import NDArray
 from xarray import Dataset
 
@@ -18,7 +19,7 @@ from .truths import Truths, draw_truths
 
 
 def spillage_study(
-    learners: Mapping[str, Learner], landing_map: LandingMap, scale: Scale, keep: Keep
+    learners: Mapping[str, Learner], landing_map: LandingMap, scale: Scale, compute: Compute
 ) -> Dataset:
     """Spilled fractions over (learned_by, rule, truth, budget).
 
@@ -28,23 +29,27 @@ def spillage_study(
         learners: By name, with the same budgets.
         landing_map: By which actions are chosen, and with whose cups they are carried out.
         scale: How many of what.
-        keep: Where simulations and calibrations are made and kept.
+        compute: Where simulations and calibrations are made and kept.
     """
     truths = draw_truths(scale.repetitions, scale.seed)
     unknowing = decide_unknowing(landing_map, default_prior(), scale.seed)
     concluded = {
-        name: conclusions(learner, name, truths, keep) for name, learner in learners.items()
+        name: conclusions(learner, name, truths, compute) for name, learner in learners.items()
     }
     (budgets,) = {learner.budgets for learner in learners.values()}
-    return _judged(truths, landing_map, unknowing, concluded, budgets, keep)
+    return _judged(truths, landing_map, unknowing, concluded, budgets, compute)
 
 
-def conclusions(learner: Learner, name: str, truths: Truths, keep: Keep) -> list[NDArray | None]:
+def conclusions(
+    learner: Learner, name: str, truths: Truths, compute: Compute
+) -> list[NDArray | None]:
     """Of each truth; None where its calibration failed."""
     asked = jobs(truths.theta, truths.seed)
     with progress_bar(f"calibrating ({name})", len(asked), shown=True) as advance:
-        one_each = keep._replace(identity=learner.identity, batch=1)
-        found = run_missing(learner.simulate, asked, one_each, advance=advance)
+        one_each = replace(compute, batch=1)
+        found = run_missing(
+            learner.simulate, asked, one_each, identity=learner.identity, advance=advance
+        )
     return [result.signal for result in found]
 
 
@@ -54,7 +59,7 @@ def _judged(
     unknowing: Action,
     concluded: Mapping[str, list[NDArray | None]],
     budgets: tuple[int, ...],
-    keep: Keep,
+    compute: Compute,
 ) -> Dataset:
     shape = len(concluded), len(RULES), len(truths.seed), len(budgets)
     chosen = [
@@ -71,7 +76,7 @@ def _judged(
         mine = [action for _, _, truth, _, action in chosen if truth == at]
         actions.append([tried(landing_map, own).least("mean"), unknowing, *mine])
     with progress_bar("pouring what was chosen", len(truths.seed), shown=True) as advance:
-        spilled = execute(truths, actions, landing_map, keep, advance)
+        spilled = execute(truths, actions, landing_map, compute, advance)
     values, rates, distances = (np.full(shape, np.nan) for _ in range(3))
     for at, outcome in enumerate(spilled):
         mine = [row for row in chosen if row[2] == at]

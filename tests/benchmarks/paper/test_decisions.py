@@ -2,14 +2,15 @@
 
 import numpy as np
 import pytest
-from bolfi_liquids.inference.simulations import Keep
+from bolfi_liquids.inference.simulations import Compute
 
 from bolfi_liquids import inference, models
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.pouring.landed_pours import LandedPours
+from bolfi_liquids.pouring.landed_pours import Parcels
 from bolfi_liquids.pouring.landing_map import map_of_prior
 from bolfi_liquids.progress import silent
+from bolfi_liquids.simulators import PourSimulator
 
 from .decisions import decide, decide_unknowing, execute
 from .truths import DENSITY, draw_truths
@@ -22,7 +23,7 @@ def best_distance(viscosity):
     return 0.05 - 0.005 * np.log(viscosity / 3e-3)
 
 
-def landings(liquid, angular_velocity, cups, seeds, effects=None):
+def landings(liquid, angular_velocity, cups, seeds, particles=0, effects=None):
     """In place of pours: all lands on a line, whatever the angular velocity."""
     middle = best_distance(np.broadcast_to(liquid.viscosity, len(seeds)))
     position = np.zeros((len(seeds), 300, 2), np.float32)
@@ -41,7 +42,8 @@ def spilled(viscosity, distance):
 def landing_map(monkeypatch):
     monkeypatch.setattr(models, "landings", landings)
     with inference.SimulationBank(":memory:") as bank:
-        yield map_of_prior(default_prior(), LandedPours(bundled_cups(), DENSITY), 64, Keep(bank))
+        pours = PourSimulator(bundled_cups(), DENSITY, Parcels())
+        yield map_of_prior(default_prior(), pours, 64, Compute(bank=bank))
 
 
 def test_rules_decide_and_what_they_decide_is_carried_out(landing_map):
@@ -54,7 +56,7 @@ def test_rules_decide_and_what_they_decide_is_carried_out(landing_map):
     truths = draw_truths(1, 0)
     chosen = [list(actions.values())] * len(truths.seed)
     with inference.SimulationBank(":memory:") as bank:
-        found = np.array(execute(truths, chosen, landing_map, Keep(bank), silent))
+        found = np.array(execute(truths, chosen, landing_map, Compute(bank=bank), silent))
     for column, action in enumerate(actions.values()):
         known = spilled(truths.viscosity, action["distance"])
         assert found[:, column] == pytest.approx(known, abs=0.01)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bolfi_liquids.inference import engine_version
-from bolfi_liquids.inference.simulations import Keep
+from bolfi_liquids.inference.simulations import Compute
 
 from bolfi_liquids import inference, models
 from bolfi_liquids.inputs.bundled import bundled_recording
@@ -79,8 +79,8 @@ class Failing:
 def test_conclusions_are_those_of_the_truths_and_a_failed_one_is_none(pooled):
     truths = draw_truths(1, seed=0)
     with inference.SimulationBank() as bank, ThreadPoolExecutor(2) as pool:
-        keep = Keep(bank, executor=pool if pooled else None)
-        found = conclusions(Failing(truths.seed[2]), "stub", truths, keep)
+        compute = Compute(bank=bank, executor=pool if pooled else None)
+        found = conclusions(Failing(truths.seed[2]), "stub", truths, compute)
     assert found[2] is None
     for at in (0, 1, 3, 4):
         assert found[at] == truths.viscosity[at]

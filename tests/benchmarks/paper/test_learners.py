@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.inputs.bundled import bundled_recording
+from bolfi_liquids.simulators import stir_simulator
 
 from .learners import until_stroke
 
@@ -13,7 +13,9 @@ def test_stirring_that_ends_early_is_the_beginning_of_the_same_stirring():
     longer = until_stroke(bundled_recording("water"), 3)
     first = until_stroke(longer, 2)
     theta = {"viscosity": np.array([0.1]), "cohesion": np.array([0.3])}
-    short, full = (stirring_of([one], 0).simulate(theta, np.array([4])) for one in (first, longer))
+    short, full = (
+        stir_simulator([one], 0).simulate(theta, np.array([4])) for one in (first, longer)
+    )
     assert short.shape[1] < full.shape[1]
     same = short.shape[1] - 3  # the curve through the samples bends by those that follow
     assert 20 < same < 60

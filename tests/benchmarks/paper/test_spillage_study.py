@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bolfi_liquids.inference.simulations import Keep
+from bolfi_liquids.inference.simulations import Compute
 
 from bolfi_liquids import inference
 from bolfi_liquids.inputs.cups import bundled_cups
@@ -52,7 +52,7 @@ class Map:
         return Surface(RATES, DISTANCES, spilled(np.atleast_1d(liquids["viscosity"])))
 
 
-def execute(truths, actions, landing_map, keep, advance):
+def execute(truths, actions, landing_map, compute, advance):
     """In place of pours with the true liquid."""
     for viscosity, chosen in zip(truths.viscosity, actions, strict=True):
         by_action = spilled(np.array([viscosity]))[0]
@@ -87,7 +87,7 @@ def made(monkeypatch):
     monkeypatch.setattr(study, "execute", lambda *given: list(execute(*given)))
     learners = {name: Learner(name, 3 if name == "pour" else None) for name in OFF}
     with inference.SimulationBank() as bank:
-        return study.spillage_study(learners, Map(), SCALE, Keep(bank))
+        return study.spillage_study(learners, Map(), SCALE, Compute(bank=bank))
 
 
 def expected(name, rule, viscosity, budget):
@@ -175,7 +175,7 @@ def test_what_was_concluded_before_a_kill_is_not_concluded_again(tmp_path, monke
 
     def run(path, learner):
         with inference.SimulationBank(path) as bank:
-            return study.spillage_study({"signal": learner}, Map(), SCALE, Keep(bank))
+            return study.spillage_study({"signal": learner}, Map(), SCALE, Compute(bank=bank))
 
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path / "bank.sqlite", Killed("signal"))

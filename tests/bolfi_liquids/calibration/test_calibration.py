@@ -20,10 +20,10 @@ from bolfi_liquids import inference, models
 from bolfi_liquids.calibration import calibrate as calibrating
 from bolfi_liquids.calibration.check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES
 from bolfi_liquids.calibration.posterior_figure import grid_density, marginal
-from bolfi_liquids.calibration.stir_simulator import Stirring, stirring_of
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.prior import default_prior
+from bolfi_liquids.simulators import StirSimulator, stir_simulator
 
 
 def test_summary_is_of_the_posterior(calibration, settings):
@@ -63,7 +63,7 @@ def test_summary_says_below_which_viscosity_liquids_look_alike(
 
 
 def test_closest_is_of_the_posterior_draws_and_reproducible(calibration, short_recording, settings):
-    stirring = stirring_of([bl.open_recording(short_recording)], settings["particles"])
+    stirring = stir_simulator([bl.open_recording(short_recording)], settings["particles"])
     drawn = calibration.tree["posterior_predictive"]["inclination"].to_numpy()[0]
     discrepancies = [stirring.discrepancy()(stirring.observed, signal) for signal in drawn]
     at = int(np.argmin(discrepancies))
@@ -100,10 +100,10 @@ def test_several_recordings_add_up(short_recording, dataset, tmp_path, rng, sett
     other = tmp_path / "other.nc"
     dataset.isel(time=slice(0, 40)).to_netcdf(other)
     pair = [bl.open_recording(short_recording), bl.open_recording(other)]
-    both = stirring_of(pair, settings["particles"])
+    both = stir_simulator(pair, settings["particles"])
     assert both.observed.shape == (100, 2)
     simulated = both.observed + 0.01 * rng.normal(size=both.observed.shape)
-    parts = [stirring_of([recording], settings["particles"]) for recording in pair]
+    parts = [stir_simulator([recording], settings["particles"]) for recording in pair]
     alone = [
         part.discrepancy()(part.observed, signal)
         for part, signal in zip(parts, np.split(simulated, [60]), strict=True)
@@ -209,7 +209,7 @@ def test_settings_may_be_integers_of_numpy(short_recording, calibration, setting
 def test_stirs_that_take_too_long_are_counted_and_their_limit_is_kept(
     short_recording, settings, tmp_path, monkeypatch, caplog
 ):
-    simulate, calls = Stirring.simulate, []
+    simulate, calls = StirSimulator.simulate, []
 
     def slow(self, theta, seeds):
         calls.append(seeds)
@@ -217,7 +217,7 @@ def test_stirs_that_take_too_long_are_counted_and_their_limit_is_kept(
             raise models.TimeLimitExceeded
         return simulate(self, theta, seeds)
 
-    monkeypatch.setattr(Stirring, "simulate", slow)
+    monkeypatch.setattr(StirSimulator, "simulate", slow)
     monkeypatch.setattr(job, "within", given_up)
     made = bl.calibrate(
         short_recording, out=tmp_path / "run", timeout=600.0, progress=False, **settings

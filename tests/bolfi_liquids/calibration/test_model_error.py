@@ -15,14 +15,14 @@ from bolfi_liquids.calibration import calibrate as calibrating
 from bolfi_liquids.calibration import check as checking
 from bolfi_liquids.calibration.check import check_of
 from bolfi_liquids.calibration.model_error import SHORT_PART, model_error
-from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.reporting.sentences import model_error_sentence
 from bolfi_liquids.run.simulations import Kept
+from bolfi_liquids.simulators import stir_simulator
 
 
 @pytest.fixture
 def stirring(short_recording):
-    return stirring_of([bl.open_recording(short_recording)], 200)
+    return stir_simulator([bl.open_recording(short_recording)], 200)
 
 
 @pytest.mark.parametrize("viscosity", [0.001, 0.1, 1.0])

@@ -6,10 +6,10 @@ from types import MappingProxyType
 import numpy as np
 from bolfi_liquids.hardware.motion import Trajectory, star
 
-from bolfi_liquids.calibration.stir_simulator import Stirring
 from bolfi_liquids.calibration.stir_windows import windows
 from bolfi_liquids.inputs.recording import Recording
 from bolfi_liquids.inputs.strokes import resting
+from bolfi_liquids.simulators import StirSimulator
 
 
 def recorded(path: Trajectory) -> Recording:
@@ -19,7 +19,7 @@ def recorded(path: Trajectory) -> Recording:
 
 def test_windows_cover_every_sample_of_every_recording_once_by_stroke():
     both = tuple(recorded(star(speed=v, height=0.2)) for v in (0.1, 0.05))
-    stirring = Stirring(both, ())
+    stirring = StirSimulator(both, ())
     made = windows(stirring)
     by_stroke = [window.samples for window in made if "stroke" in window.label]
     assert (np.sum(by_stroke, axis=0) == 1).all()

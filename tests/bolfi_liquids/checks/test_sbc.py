@@ -20,11 +20,8 @@ from bolfi_liquids.checks.sbc_pipelines import (
     _nearest,
 )
 from bolfi_liquids.inputs.settings import RUNS_PER_POINT, CalibrationSettings, SbcSettings
-from bolfi_liquids.run.compute import Compute
 
 SMALL = {"design": 8, "budget": 8, "particles": 200, "seed": 3}
-
-QUIET = Compute(progress=False)
 
 
 def rows(path, table):
@@ -94,7 +91,7 @@ def test_bad_settings_are_named(setting, value):
 def test_a_check_goes_on_where_it_ended(tmp_path, short_recording):
     out = tmp_path / "sbc"
     few = SbcSettings(runs=3, sequential=1, **SMALL)
-    found = check_sbc(out, short_recording, settings=few, compute=QUIET)
+    found = check_sbc(out, short_recording, settings=few, progress=False)
     assert {name: len(one.replicates) for name, one in found.items()} == {
         "signal": 3,
         "discrepancy": 1,
@@ -102,7 +99,7 @@ def test_a_check_goes_on_where_it_ended(tmp_path, short_recording):
     assert rows(out / "simulations.sqlite", "simulation") == RUNS_PER_POINT * SMALL["design"]
 
     more = SbcSettings(runs=5, sequential=1, **SMALL)
-    again = check_sbc(out, short_recording, settings=more, compute=QUIET)
+    again = check_sbc(out, short_recording, settings=more, progress=False)
     first = [one.replicates.finished[0].draws for one in (found["signal"], again["signal"])]
     np.testing.assert_array_equal(*first)
     assert rows(out / "simulations.sqlite", "simulation") == RUNS_PER_POINT * SMALL["design"]
@@ -114,4 +111,4 @@ def test_a_check_goes_on_where_it_ended(tmp_path, short_recording):
 
     other = SbcSettings(runs=3, sequential=1, **{**SMALL, "seed": 4})
     with pytest.raises(ValueError, match="settings.seed is 3 in the run, but 4 was asked"):
-        check_sbc(out, short_recording, settings=other, compute=QUIET)
+        check_sbc(out, short_recording, settings=other, progress=False)

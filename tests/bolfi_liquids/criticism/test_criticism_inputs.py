@@ -8,13 +8,13 @@ import pytest
 import xarray as xr
 
 from bolfi_liquids.calibration.baseline import Clean, apart, usual_elsewhere, usual_for
-from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.calibration.stirs import camera_noise, held_out_noise, stir_experiment
 from bolfi_liquids.criticism.inputs import ComparedData, check_effects, open_inputs
 from bolfi_liquids.errors import Argument, InputError
 from bolfi_liquids.inputs.cups import open_cups
 from bolfi_liquids.inputs.open import open_recordings
 from bolfi_liquids.inputs.settings import CriticismSettings
+from bolfi_liquids.simulators import stir_simulator
 
 HEADER = "angular_velocity_deg_s,distance_cm,spilled,received,retained"
 ROWS = ["45,1,5,90,5", "90,2,10,85,5", "60,3,20,75,5"]
@@ -218,7 +218,7 @@ def test_clean_recordings_of_the_same_path_say_where_it_errs(stirred):
     recording = recorded(stirred, rng)
     residual = 10.0 * SD * np.sin(np.linspace(0.0, 9.0, len(recording.time)))[:, None] * [1.0, 0.5]
     clean = [Clean(recording, residual, 1.0, 1)]
-    stirring = stirring_of([recording], 200)
+    stirring = stir_simulator([recording], 200)
     same, elsewhere = usual_for(stirring, clean, 0.5), usual_elsewhere(stirring, clean, 0.5)
     assert [one.same for one in same.clean] == [True]
     assert [one.same for one in elsewhere.clean] == [False]

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from bolfi_liquids import models
-from bolfi_liquids.criticism.pours import Pouring
+from bolfi_liquids.criticism.pours import Fractions
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.seeds import Phase, simulation_seeds
+from bolfi_liquids.simulators import PourSimulator
 
 RATE = np.radians([160.0, 120.0, 160.0, 180.0, 120.0])  # neither sorted nor once each
 DISTANCE = np.array([0.01, 0.03, 0.04, 0.02, -0.01])
@@ -17,7 +18,8 @@ DENSITY = 1000.0
 def test_each_pour_spills_what_it_spills_alone():
     cups, seeds = bundled_cups(), np.array([3, 5])
     theta = {"viscosity": np.array([0.01, 1.0]), "cohesion": np.array([0.2, 0.7])}
-    signals = Pouring(RATE, DISTANCE, cups, DENSITY).simulate(theta, seeds)
+    pours = PourSimulator(cups, DENSITY, Fractions(RATE, DISTANCE))
+    signals = pours.simulate(theta, seeds)
     rates = np.unique(RATE)
     for run, seed in enumerate(seeds):
         one = {name: values[run] for name, values in theta.items()}

@@ -121,5 +121,5 @@ def test_integers_of_numpy_are_settings():
 
 def test_no_pour_is_chosen_over_a_posterior_that_is_not_the_latest(criticised):
     base = bl.Criticism.open(criticised).base
-    with pytest.raises(InputError, match="another posterior since"):
+    with pytest.raises(InputError, match="another posterior.*RUN directory"):
         bl.choose_pour(base, progress=False)

@@ -5,10 +5,10 @@ import pytest
 from bolfi_liquids.hardware.motion import star
 from bolfi_liquids.inference import Bolfi
 from bolfi_liquids.inference.simulations import Simulation
+from bolfi_liquids.inference.simulations.failures import raised
 
 import bolfi_liquids as bl
 from bolfi_liquids import models
-from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.calibration.summary import BAD_FIT_RATIO
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.prior import default_prior
@@ -32,6 +32,7 @@ from bolfi_liquids.online.plan import (
 from bolfi_liquids.online.record import BAD_FIT, sentence
 from bolfi_liquids.online.settings import OnlineSettings
 from bolfi_liquids.pouring.result import Judged
+from bolfi_liquids.simulators import stir_simulator
 
 ATTRS = {
     "cup_radius": 0.04,
@@ -67,7 +68,7 @@ def signals(theta, seeds, time=PLAN.time):
 
 
 def problem(surrogate="discrepancy", **settings):
-    stirring = stirring_of([PLAN], 200)
+    stirring = stir_simulator([PLAN], 200)
     return Problem(default_prior(), stirring, OnlineSettings(surrogate=surrogate, **settings))
 
 
@@ -112,7 +113,7 @@ def test_missing_samples_equal_a_shorter_recording():
     known, seen = made(of), followed(4)
     samples = int(np.isfinite(seen.observed).all(axis=1).sum())
     short = planned(PLAN.time[:samples], PATH.position[:samples], ATTRS)
-    stirring = stirring_of([short], 200)
+    stirring = stir_simulator([short], 200)
     engine = Bolfi(
         of.prior,
         seen.observed[:samples],
@@ -156,7 +157,7 @@ def test_failed_simulations_are_kept_as_such_and_teach_nothing():
     of = problem()
     known = made(of)
     jobs = proposals(of, known, followed(6).observed, 16, 2)
-    failed = Simulation(None, "it raised", 0.1)
+    failed = Simulation(None, raised(OSError("it raised")), 0.1)
     good = Simulation(signals(TRUTH, [7])[0], None, 0.1)
     more = with_results(known, jobs, [failed, good])
     assert more.size == 18
@@ -211,7 +212,7 @@ def test_an_online_estimate_names_a_wrong_frame():
     """A stick that leans ahead of the gripper: the sign of a plane is wrong."""
     recording = bundled_recording("glycerin")
     plan = planned(recording.time, recording.gripper.position, recording.attrs)
-    of = Problem(default_prior(), stirring_of([plan], 200), OnlineSettings(design=8))
+    of = Problem(default_prior(), stir_simulator([plan], 200), OnlineSettings(design=8))
     ends = stroke_ends(plan)
     for sign, faults in ((1.0, 0), (-1.0, 1)):
         seen = recording.inclination * [1.0, sign]

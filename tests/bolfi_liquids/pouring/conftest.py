@@ -26,11 +26,11 @@ class MadeUp(NamedTuple):
         """Share that stays in the source."""
         return 0.3 * viscosity / (1.0 + viscosity)
 
-    def draining(self, liquid, angular_velocity, cups, seeds, held, effects=None):
-        viscosity = np.broadcast_to(np.asarray(liquid.viscosity, float), len(seeds))
+    def draining(self, batch, held):
+        viscosity = np.broadcast_to(np.asarray(batch.liquid.viscosity, float), len(batch.seeds))
         return self.film(viscosity)[:, None] * np.exp(-np.asarray(held))
 
-    def landings(self, liquid, angular_velocity, cups, seeds, effects=None):
+    def landings(self, liquid, angular_velocity, cups, seeds, particles=0, effects=None):
         size = len(seeds)
         self.calls.append(size)
         viscosity, cohesion, rate = (

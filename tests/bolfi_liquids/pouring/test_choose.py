@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from bolfi_liquids.inference.simulations import Compute
 from typer.testing import CliRunner
 
 import bolfi_liquids as bl
@@ -16,7 +17,8 @@ from bolfi_liquids.cli.app import app
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.cups import bundled_cups
-from bolfi_liquids.pouring.choose import strata
+from bolfi_liquids.inputs.settings import PourSettings
+from bolfi_liquids.pouring.choose import decided, strata
 from bolfi_liquids.pouring.landing_map import LANDINGS_PER_DRAW
 from bolfi_liquids.pouring.result import PourSummary
 from bolfi_liquids.run.run import SIMULATIONS, Run
@@ -129,12 +131,13 @@ def test_an_effect_that_does_not_act_in_pours_needs_no_new_ones(
     more = {**pour_settings, "force": True, "progress": False}
     bl.choose_pour(run, **more)
     before = len(made_up.calls)
-    bl.choose_pour(extended(run, "camera_tilt"), **more)
+    cups = pour_settings["cups"]
+    settings = PourSettings(**{k: v for k, v in pour_settings.items() if k != "cups"})
+    decided(extended(run, "camera_tilt"), cups, settings, Compute())
     assert len(made_up.calls) == before
-    bl.choose_pour(extended(run, "adhesion"), **more)
+    tree = decided(extended(run, "adhesion"), cups, settings, Compute()).tree
     count = pour_settings["budget"]
     assert sum(made_up.calls) == 2 * count
-    tree = xr.load_datatree(run.path / "pour.nc")
     assert (tree["pours"]["adhesion"] == 0.0).sum() == count < tree["pours"].sizes["pour"]
 
 
@@ -146,6 +149,14 @@ def extended(calibration, effect):
     tree["posterior"] = xr.DataTree(posterior.assign({effect: (("chain", "draw"), drawn)}))
     summary = replace(calibration.summary, best={**calibration.best, effect: 0.15})
     return replace(calibration, tree=tree, summary=summary)
+
+
+def test_draws_that_were_changed_are_not_poured(made_up, calibration, pour_settings, tmp_path):
+    run = bl.Calibration.open(shutil.copytree(calibration.path, tmp_path / "run"))
+    run.tree["posterior"]["viscosity"][:] *= 2.0
+    with pytest.raises(InputError, match="another posterior"):
+        bl.choose_pour(run, **pour_settings, force=True, progress=False)
+    assert not made_up.calls
 
 
 def test_a_choice_that_was_killed_goes_on_from_its_pours(

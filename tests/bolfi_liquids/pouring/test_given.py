@@ -5,7 +5,7 @@ import shutil
 
 import numpy as np
 import pytest
-from bolfi_liquids.inference.simulations import Keep
+from bolfi_liquids.inference.simulations import Compute
 from typer.testing import CliRunner
 
 import bolfi_liquids as bl
@@ -17,6 +17,7 @@ from bolfi_liquids.pouring.draining import Draining, hold_of
 from bolfi_liquids.reporting.warnings import Results, warnings_of
 from bolfi_liquids.run.given_pours import GIVEN_POURS, kept_pours
 from bolfi_liquids.run.run import Run
+from bolfi_liquids.simulators import PourSimulator
 
 HEADER = "angular_velocity_deg_s,distance_cm,spilled,received,retained"
 MORE = {"force": True, "progress": False}
@@ -192,14 +193,15 @@ def test_terminal_and_page_show_the_pours_beside_the_choice(chosen, tmp_path):
 def test_how_long_the_source_must_be_held(monkeypatch, power):
     """Half of the liquid stays at first; from half a second on it thins as a power of time."""
 
-    def draining(liquid, rate, cups, seeds, held, effects=None):
-        assert held[-1] <= cups.pour.hold
-        return np.tile(0.5 * (np.maximum(held, 0.5) / 0.5) ** -power, (len(seeds), 1))
+    def draining(batch, held):
+        assert held[-1] <= batch.cups.pour.hold
+        return np.tile(0.5 * (np.maximum(held, 0.5) / 0.5) ** -power, (len(batch.seeds), 1))
 
     monkeypatch.setattr(models, "draining", draining)
     liquids = {"viscosity": np.geomspace(1.0, 9.0, 16), "cohesion": np.full(16, 0.5)}
     with inference.SimulationBank(":memory:") as bank:
-        hold = hold_of(Draining(bundled_cups(), 1000.0), 1.0, liquids, Keep(bank))
+        pours = PourSimulator(bundled_cups(), 1000.0, Draining())
+        hold = hold_of(pours, 1.0, liquids, Compute(bank=bank))
     until = 0.5 * 5.0 ** (1.0 / power)  # 6, 28 and 1563 s
     known = until if until < 60.0 else np.nan
     assert hold.until_tenth_s == pytest.approx(known, abs=0.1, nan_ok=True)

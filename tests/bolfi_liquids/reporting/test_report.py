@@ -10,6 +10,7 @@ from multiprocessing import get_context
 
 import pytest
 import xarray as xr
+from bolfi_liquids.inference.simulations import Compute
 
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.summary import ParameterSummary
@@ -17,7 +18,6 @@ from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring.result import ActionSummary, PourSummary
 from bolfi_liquids.reporting import criticism_sentences, frames, sentences
 from bolfi_liquids.reporting.report import prior_text
-from bolfi_liquids.run.compute import Compute
 from bolfi_liquids.run.result_file import _parsed
 from bolfi_liquids.run.run import Run
 
@@ -123,15 +123,15 @@ def unseen(pour, tmp_path):
 def test_a_report_says_where_its_pictures_are_simulated(unseen, monkeypatch):
     seen = []
 
-    def simulated(scenes, draws, compute):
-        seen.append((compute, scenes.stir.timeout, scenes.pour.timeout))
+    def simulated(scenes, draws, workers, progress):
+        seen.append((workers, progress, scenes.stir.timeout, scenes.pour.timeout))
         raise TimeoutError
 
     monkeypatch.setattr(frames, "_simulated", simulated)
     spawn = get_context("spawn")
     with ProcessPoolExecutor(1, spawn) as pool, pytest.raises(RuntimeError, match="60 s"):
         bl.report(unseen, executor=pool, timeout=60.0, progress=False)
-    assert seen == [(Compute(pool, 60.0, False), 60.0, 60.0)]
+    assert seen == [(pool, False, 60.0, 60.0)]
 
 
 def test_no_result_is_opened_twice(pour, frames, monkeypatch):
@@ -159,8 +159,8 @@ def test_pictures_by_processes_have_the_same_bits(unseen, shown):
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         elsewhere = replace(shown.calibration, run=Run.open(unseen))
         given = shown._replace(calibration=elsewhere)
-        there = frames.frames_of(given, Compute(pool, progress=False))
-    assert there.identical(frames.frames_of(shown, Compute(progress=False)))
+        there = frames.frames_of(given, Compute(pool), progress=False)
+    assert there.identical(frames.frames_of(shown, Compute(), progress=False))
 
 
 @pytest.mark.slow

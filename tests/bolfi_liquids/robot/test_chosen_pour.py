@@ -17,8 +17,7 @@ from bolfi_liquids.cli.record import next_commands
 from bolfi_liquids.criticism.result import calibration_to_pour
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.reporting.warnings import Results, warnings_of
-from bolfi_liquids.robot.chosen_pour import BAD_FIT, chosen_pour
-from bolfi_liquids.robot.pour import plan_pour
+from bolfi_liquids.robot.pour import BAD_FIT, chosen_pour, plan_pour
 from bolfi_liquids.robot.stir import plan_stir
 from bolfi_liquids.run.run import Run
 from bolfi_liquids.wording import spilled

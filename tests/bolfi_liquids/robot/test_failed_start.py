@@ -22,7 +22,7 @@ def task(tmp_path):
 
 def session(task):
     """With an arm that does not answer, though somebody has agreed."""
-    return armed_session(task, ask=lambda _: CONFIRMATION)
+    return armed_session(task, lambda _: CONFIRMATION)
 
 
 def test_a_robot_that_does_not_answer_leaves_no_directory(task):

@@ -9,7 +9,6 @@ import bolfi_liquids as bl
 from bolfi_liquids import hardware, models
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.robot.hidden_stir import with_stir
-from bolfi_liquids.robot.lone_emulator import emulator_until_interrupted
 from bolfi_liquids.robot.stir import plan_stir
 
 RIG = hardware.bundled_rig()
@@ -36,12 +35,6 @@ def test_a_senseless_viscosity_is_refused_before_anything_starts():
     for viscosity in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(hardware.RigError, match="viscosity"):
             hardware.HiddenLiquid(viscosity=viscosity)
-
-
-def test_an_address_that_others_reach_is_refused_before_the_stir_is_simulated(monkeypatch):
-    monkeypatch.setattr(models, "stir", lambda *_: pytest.fail("a stir was simulated"))
-    with pytest.raises(hardware.RigError, match=r"10\.0\.0\.1"):
-        next(emulator_until_interrupted(RIG, "10.0.0.1"))
 
 
 def test_a_stir_that_cannot_be_simulated_is_refused_before_the_session(tmp_path, monkeypatch):

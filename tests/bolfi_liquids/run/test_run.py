@@ -248,7 +248,7 @@ def rewritten(run, change):
 
 
 def poured(run, after, given=""):
-    """Keep a result as `pour` keeps one."""
+    """Compute a result as `pour` keeps one."""
     tree = run.required("calibrate").copy()
     run.keep("pour", tree, {"after": after, "given": given}, {"distance_cm": 2.0})
 

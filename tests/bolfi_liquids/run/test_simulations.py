@@ -1,17 +1,28 @@
 """What was simulated once is taken from the bank."""
 
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
-from bolfi_liquids.inference.simulations import Keep
-from bolfi_liquids.inference.simulations.failures import Failure
+from bolfi_liquids.inference.simulations import Compute
+from bolfi_liquids.inference.simulations.failures import FailureKind
 
 from bolfi_liquids.run.simulations import (
     CURES,
     simulate_kept,
 )
+from bolfi_liquids.simulators import FluidSimulator
+
+
+@dataclass(frozen=True)
+class Made(FluidSimulator):
+    """A function in place of the fluid."""
+
+    simulate: Callable
+    identity: str = "line"
 
 
 def test_only_what_is_missing_is_simulated():
@@ -23,12 +34,12 @@ def test_only_what_is_missing_is_simulated():
 
     theta = {"a": np.array([0.0, 1.0, 2.0, 3.0, 4.0])}
     with SimulationBank() as bank:
-        keep = Keep(bank, "line", 2)
-        first = simulate_kept(simulate, {"a": theta["a"][1:3]}, [6, 7], keep)
+        compute = Compute(bank=bank, batch=2)
+        first = simulate_kept(Made(simulate), {"a": theta["a"][1:3]}, [6, 7], compute)
         np.testing.assert_array_equal(first.signals[:, 0], [601.0, 702.0])
-        whole = simulate_kept(simulate, theta, [5, 6, 7, 8, 9], keep)
+        whole = simulate_kept(Made(simulate), theta, [5, 6, 7, 8, 9], compute)
         np.testing.assert_array_equal(whole.signals[:, 0], [500.0, 601.0, 702.0, 803.0, 904.0])
-        simulate_kept(simulate, theta, [5, 6, 7, 8, 9], keep._replace(identity="other"))
+        simulate_kept(Made(simulate, "other"), theta, [5, 6, 7, 8, 9], compute)
     assert asked == [[6, 7], [5], [8], [9], [5, 6], [7, 8], [9]]
 
 
@@ -37,11 +48,11 @@ def test_diverged_ones_are_left_out():
         return np.where(theta["a"] > 1.0, np.nan, theta["a"])[:, None]
 
     with SimulationBank() as bank:
-        keep = Keep(bank, "", 8)
-        kept = simulate_kept(simulate, {"a": np.array([0.0, 2.0, 1.0])}, [1, 2, 3], keep)
+        compute = Compute(bank=bank, batch=8)
+        kept = simulate_kept(Made(simulate), {"a": np.array([0.0, 2.0, 1.0])}, [1, 2, 3], compute)
         np.testing.assert_array_equal(kept.signals, [[0.0], [1.0]])
         with pytest.raises(RuntimeError, match="all 1 simulations failed"):
-            simulate_kept(simulate, {"a": np.array([2.0])}, [2], keep)
+            simulate_kept(Made(simulate), {"a": np.array([2.0])}, [2], compute)
 
 
 def failing(theta, seeds):
@@ -54,11 +65,16 @@ def failing(theta, seeds):
 
 @pytest.mark.parametrize(
     ("a", "failure"),
-    [(2.0, Failure.RAISED), (0.5, Failure.NOT_FINITE), (-1.0, Failure.TIMEOUT)],
+    [(2.0, FailureKind.RAISED), (0.5, FailureKind.NOT_FINITE), (-1.0, FailureKind.TIMEOUT)],
 )
 def test_where_all_fail_the_advice_is_of_their_kind(a, failure):
     with SimulationBank() as bank, pytest.raises(RuntimeError) as failed:
-        simulate_kept(failing, {"a": np.array([a])}, [1], Keep(bank, "", 1, None, 0.05))
+        simulate_kept(
+            Made(failing),
+            {"a": np.array([a])},
+            [1],
+            Compute(bank=bank, batch=1, executor=None, timeout=0.05),
+        )
     assert [kind for kind, cure in CURES.items() if cure in str(failed.value)] == [failure]
 
 
@@ -68,9 +84,9 @@ def test_simulations_that_took_too_long_are_counted(caplog):
         return theta["a"][:, None]
 
     with SimulationBank() as bank:
-        keep = Keep(bank, "", 1, None, 0.2)
-        simulate_kept(slow, {"a": np.array([0.0, 2.0, 3.0])}, [1, 2, 3], keep)
-        simulate_kept(slow, {"a": np.array([0.0])}, [1], keep)
+        compute = Compute(bank=bank, batch=1, executor=None, timeout=0.2)
+        simulate_kept(Made(slow), {"a": np.array([0.0, 2.0, 3.0])}, [1, 2, 3], compute)
+        simulate_kept(Made(slow), {"a": np.array([0.0])}, [1], compute)
     (notice,) = caplog.records
     assert notice.args == (2, 3, 0.2)
 
@@ -87,7 +103,7 @@ def test_simulations_that_failed_are_counted_with_the_first_reason(caplog):
         for repeated in range(2):  # what the bank holds is told again
             caplog.clear()
             theta = {"a": np.array([0.0, 2.0, 3.0, 1.0])}
-            simulate_kept(simulate, theta, [1, 2, 3, 4], Keep(bank, "", 1))
+            simulate_kept(Made(simulate), theta, [1, 2, 3, 4], Compute(bank=bank, batch=1))
             (notice,) = caplog.records
             assert notice.args[:2] == (2, 4), repeated
             assert "\n" not in notice.getMessage()

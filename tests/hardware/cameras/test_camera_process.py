@@ -19,18 +19,18 @@ from bolfi_liquids.hardware.cameras.rendered import RenderedCamera, Timing  # no
 from bolfi_liquids.hardware.recorder.csv_file import read_csv  # noqa: E402
 from bolfi_liquids.hardware.recorder.events import read_events  # noqa: E402
 from bolfi_liquids.hardware.recorder.rate import no_rate  # noqa: E402
-from bolfi_liquids.hardware.recorder.stamps import MAX_BAD_STAMPS  # noqa: E402
 from bolfi_liquids.hardware.recorder.video import VideoWriter  # noqa: E402
 from bolfi_liquids.hardware.recorder.views import camera_model, stick_view  # noqa: E402
 from bolfi_liquids.hardware.rendering.drawing import prepare, render  # noqa: E402
-from bolfi_liquids.hardware.rendering.scene import CLEAN, Look, Scene  # noqa: E402
-from bolfi_liquids.hardware.rendering.world import MovingWorld, WorldState  # noqa: E402
+from bolfi_liquids.hardware.rendering.scene import Look, Scene  # noqa: E402
+from bolfi_liquids.hardware.rendering.world import WorldState  # noqa: E402
 from bolfi_liquids.hardware.rig_file import bundled_rig  # noqa: E402
 from bolfi_liquids.hardware.session.camera_process import _Tally as Tally  # noqa: E402
 from bolfi_liquids.hardware.session.camera_process import run_camera, tallied  # noqa: E402
 from bolfi_liquids.hardware.vision.frame import Frame  # noqa: E402
 from bolfi_liquids.hardware.vision.frame_measurement import FrameMeasurement  # noqa: E402
 from bolfi_liquids.hardware.vision.measuring import FrameMeter  # noqa: E402
+from rendered_scenes import CLEAN, MovingWorld  # noqa: E402
 
 # pictures come at 30 Hz, and none may be missed; the others keep no time
 keeps_time = pytest.mark.punctual
@@ -138,7 +138,7 @@ def test_rows_and_pictures_agree_and_main_s_end_ends_the_process(start, tmp_path
     assert len(video) == len(table["index"]) >= 90
     taken = table["stamp"] - table["stamp"][0]
     np.testing.assert_allclose([frame.stamp for frame in video], taken, atol=1.1e-3)
-    angle = swing(table["stamp"] - 1000.0)[1][:, 0]
+    angle = swing(table["stamp"] - Timing().latency)[1][:, 0]
     good = table["flags"] == 0
     assert good.mean() > 0.9
     assert np.abs(table["angle"] - angle)[good].max() < np.radians(0.3)
@@ -185,7 +185,7 @@ def test_the_line_is_where_it_was_in_the_recorded_video(tmp_path):
     for k in range(40):
         pivot, inclination = swing(k / 30)
         image = render(scenery, [WorldState(k / 30, pivot, inclination)], rng)
-        angles.append(live.measure(Frame(k, k / 30, k / 30, image)).angle)
+        angles.append(live.measure(Frame(k, k / 30, image)).angle)
         video.write(image, k / 30)
     video.close()
     recorded = [again.measure(frame).angle for frame in pictures(tmp_path)]
@@ -230,7 +230,7 @@ def test_the_same_picture_again_looks_dead_and_is_recorded(start, tmp_path):
     assert len(pictures(tmp_path)) == len(table["index"]) >= after.count
     (same, _) = read_events(tmp_path)
     assert same["kind"] == "same_picture"
-    shown_since = table["stamp"][table["index"] == same["index"]] - 1000.0 - stop
+    shown_since = table["stamp"][table["index"] == same["index"]] - Timing().latency - stop
     assert 0 < shown_since[0] < 4 / 30
 
 
@@ -258,8 +258,7 @@ def test_a_clock_that_stands_still_after_the_start_is_told(start, tmp_path):
     assert row.trouble == Trouble.BAD_STAMPS
     running.end()
     (told,) = (event for event in read_events(tmp_path) if event["kind"] == "bad_stamps")
-    # a frame that came very late, just before, may count as the first
-    assert told["index"] > 30 - MAX_BAD_STAMPS
+    assert told["index"] >= 30
     assert "stand still" in told["reason"] and f"frame {told['index']}" in told["reason"]
 
 
@@ -351,10 +350,10 @@ def test_a_stamp_that_is_no_number_costs_no_video(tmp_path):
 
 
 def test_lost_and_repeated_pictures_are_counted():
-    tally = Tally(no_rate(0.0))
+    tally, meter = Tally(no_rate(0.0)), FrameMeter(stick_view(RIG, "xz"))
     for k, index in enumerate([0, 1, 2, 5, 6, 10]):
-        image = np.full((2, 2), min(k, 3), np.uint8)
-        tally = tallied(tally, Frame(index, k / 30, k / 30, image), 0.0, 1.0 + k / 30)
+        image = np.full((480, 640), min(k, 3), np.uint8)
+        tally = tallied(tally, meter.measure(Frame(index, k / 30, image)), 1.0 + k / 30)
     assert (tally.rate.total, tally.lost, tally.same) == (6, 5, 3)
     assert tally.beat == pytest.approx(1.1)
     assert tally.worst == pytest.approx(1 / 30)

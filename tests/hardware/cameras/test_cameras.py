@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -15,14 +16,9 @@ from bolfi_liquids.hardware.cameras import (
     WebcamSettings,
 )
 from bolfi_liquids.hardware.cameras.base import grey
-from bolfi_liquids.hardware.rendering import (
-    CLEAN,
-    Look,
-    MovingWorld,
-    prepare,
-    rehearsal_camera,
-    rehearsal_scene,
-)
+from bolfi_liquids.hardware.rendering import Look, prepare
+from rendered_scenes import CLEAN, MovingWorld, rehearsal_camera, rehearsal_scene
+from stepped_clock import SteppedClock
 
 cv2 = pytest.importorskip("cv2")
 
@@ -126,11 +122,9 @@ def test_a_webcam_delivers_frames_and_says_when_it_stops(video):
     first = camera.read()
     second = camera.read()
     assert first is not None and second is not None
-    assert (first.index, second.index) == (0, 1)
+    assert (first.index, second.index) == (2, 5)  # a file's pictures are all there at once
     assert first.image.shape == (48, 64)
-    assert second.host >= first.host
-    # a file's times are no times of this computer, so that of arrival is taken
-    assert first.stamp == first.host
+    assert first.stamp < second.stamp <= time.monotonic()
     with pytest.raises(CameraError, match=r"view\.avi.*no picture after frame 15"):
         for _ in range(100):
             camera.read()
@@ -158,17 +152,19 @@ def test_a_webcam_that_is_not_there_is_named(tmp_path):
 
 
 class Capture:
-    """A driver that stamps its frames."""
+    """A driver that takes a picture each 20 ms, and keeps three that nobody has fetched."""
 
-    def __init__(self, stamps):
-        self.stamps = iter(stamps)
+    def __init__(self):
+        self.start, self.fetched = time.monotonic(), 0
 
-    def read(self):
-        self.stamp = next(self.stamps)
-        return True, np.zeros((48, 64, 3), np.uint8)
+    def grab(self):
+        taken = int((time.monotonic() - self.start) / 0.02)
+        self.fetched = max(self.fetched + 1, taken - 2)
+        time.sleep(max(self.start + 0.02 * self.fetched - time.monotonic(), 0.0))
+        return True
 
-    def get(self, _):
-        return 1e3 * self.stamp
+    def retrieve(self):
+        return True, np.full((48, 64, 3), self.fetched % 256, np.uint8)
 
     def set(self, *_):
         return True
@@ -180,35 +176,19 @@ class Capture:
         pass
 
 
-@pytest.mark.parametrize(
-    ("step", "off", "used"), [(0.03, 0.0, True), (0.0, 0.0, False), (0.03, 9.0, False)]
-)
-def test_a_driver_s_stamps_are_used_if_they_advance_on_this_computer_s_clock(
-    monkeypatch, step, off, used
-):
-    import time
-
-    stamps = (time.monotonic() - off + step * np.arange(9)).tolist()
-    stamps[7] = stamps[6]  # once in between, it gives an old one
-    monkeypatch.setattr(cv2, "VideoCapture", lambda _: Capture(stamps))
+def test_a_picture_that_the_driver_has_kept_is_passed_over(monkeypatch):
+    """Nobody knows since when it was waiting; each that is given has the time of its grab."""
+    driver = Capture()
+    monkeypatch.setattr(cv2, "VideoCapture", lambda _: driver)
     camera = Webcam(0, WebcamSettings(size=(64, 48)))
-    frames = [camera.read() for _ in range(4)]
-    # never a mixture of two clocks
-    told = stamps[5:] if used else [frame.host for frame in frames]
-    assert [frame.stamp for frame in frames] == pytest.approx(told, abs=1e-9)
-
-
-class Clock:
-    """A computer's clock that only waiting moves."""
-
-    def __init__(self) -> None:
-        self.time = 50.0
-
-    def now(self) -> float:
-        return self.time
-
-    def sleep(self, duration: float) -> None:
-        self.time += duration
+    for pause in (0.0, 0.0, 0.11, 0.0, 0.5):
+        time.sleep(pause)
+        frame = camera.read()
+        assert frame is not None
+        taken = driver.start + 0.02 * driver.fetched
+        assert frame.image.mean() == driver.fetched % 256
+        assert 0.0 <= frame.stamp - taken < 0.015
+    assert frame.index > 5
 
 
 class Asked:
@@ -225,23 +205,21 @@ class Asked:
         return self._world.state(host)
 
 
-def rendered(timing: Timing, clock: Clock, world, **kwargs) -> RenderedCamera:
+def rendered(timing: Timing, clock: SteppedClock, world, **kwargs) -> RenderedCamera:
     look = dataclasses.replace(CLEAN, read_noise=1.0)
     stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), look)
-    return RenderedCamera(stage, world, timing, now=clock.now, sleep=clock.sleep, **kwargs)
+    return RenderedCamera(stage, world, timing, clock=clock, **kwargs)
 
 
-def test_a_rendered_camera_keeps_its_own_time(tmp_path):
-    clock, world = Clock(), Asked(offset=100.0)
-    timing = Timing(rate=25.0, latency=0.03, offset=-7.0, drift=1e-3)
+def test_a_rendered_camera_keeps_time(tmp_path):
+    clock, world = SteppedClock(50.0), Asked(offset=100.0)
+    timing = Timing(rate=25.0, latency=0.03)
     camera = rendered(timing, clock, world, truth=tmp_path / "truth_xz.csv")
     frames = [camera.read() for _ in range(51)]
     camera.close()
     stamps = np.array([f.stamp for f in frames])
-    # even on its own clock, which runs 1e-3 faster than the computer's
-    np.testing.assert_allclose(stamps, 43.0 + np.arange(51) / 25.0, atol=1e-9)
-    np.testing.assert_allclose(world.times, 50.0 + np.arange(51) / 25.025, atol=1e-9)
-    np.testing.assert_allclose([f.host for f in frames], np.array(world.times) + 0.03, atol=1e-9)
+    np.testing.assert_allclose(world.times, 50.0 + np.arange(51) / 25.0, atol=1e-9)
+    np.testing.assert_allclose(stamps, np.array(world.times) + 0.03, atol=1e-9)
     with (tmp_path / "truth_xz.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [int(row["index"]) for row in rows] == list(range(51))
@@ -252,22 +230,22 @@ def test_a_rendered_camera_keeps_its_own_time(tmp_path):
 
 
 def test_a_late_frame_shows_its_own_moment_and_only_old_ones_are_lost():
-    clock, world = Clock(), Asked(offset=0.0)
-    camera = rendered(Timing(rate=25.0, latency=0.0, drift=0.0), clock, world)
+    clock, world = SteppedClock(50.0), Asked(offset=0.0)
+    camera = rendered(Timing(rate=25.0, latency=0.0), clock, world)
     camera.read()
-    clock.time += 0.15
+    clock.sleep(0.15)
     late = [camera.read() for _ in range(3)]
     assert [f.index for f in late if f] == [1, 2, 3]
     np.testing.assert_allclose(world.times[1:], 50.0 + np.array([1, 2, 3]) / 25.0)
-    clock.time += 1.0
+    clock.sleep(1.0)
     assert camera.read().index > 20
-    assert clock.time - world.times[-1] <= 0.2 + 1e-9
+    assert clock.now() - world.times[-1] <= 0.2 + 1e-9
 
 
 def test_a_rendered_picture_is_what_a_camera_of_this_project_gives():
-    clock = Clock()
+    clock = SteppedClock(50.0)
     stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), Look())
-    camera = RenderedCamera(stage, Asked(0.0), now=clock.now, sleep=clock.sleep)
+    camera = RenderedCamera(stage, Asked(0.0), clock=clock)
     frame = camera.read()
     assert frame is not None
     assert (frame.image.dtype, frame.image.shape) == (np.uint8, (480, 640))

@@ -6,7 +6,7 @@ from bolfi_liquids.hardware.recorder.csv_file import CsvAppender
 from bolfi_liquids.hardware.recorder.directory import start_directory
 from bolfi_liquids.hardware.recorder.sample import Sample
 from bolfi_liquids.hardware.vision.frame_measurement import FrameMeasurement
-from closed_form_session import COMPLETED, HOST, OFFSET, RIG, WAY, frames_of, samples_of
+from closed_form_session import COMPLETED, DELAY, HOST, RIG, WAY, frames_of, samples_of
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def session(tmp_path):
         rng = np.random.default_rng(1)
         until = duration + 2 * WAY
         samples = samples_of(until, duration)
-        frames = {view: frames_of(view, until, duration, rng) for view in OFFSET}
+        frames = {view: frames_of(view, until, duration, rng) for view in DELAY}
         change(samples, frames)
         tables = {"samples": samples} | {f"frames_{v}": rows for v, rows in frames.items()}
         for name, rows in tables.items():

@@ -24,12 +24,13 @@ from bolfi_liquids.hardware.recorder.views import camera_model
 from bolfi_liquids.hardware.vision.frame_measurement import Flag
 from closed_form_session import (
     COMPLETED,
+    DELAY,
     DRIFT,
     MARKER_NOISE,
     NOISE,
-    OFFSET,
     RIG,
     WAY,
+    host_time,
     inclination,
     pivot,
 )
@@ -69,11 +70,11 @@ def test_a_recording_is_what_the_closed_forms_say(session):
 
 def test_the_cameras_times_are_right_to_two_milliseconds(session):
     attrs = bl.open_recording(finalise(session())).attrs
-    for view in OFFSET:
+    for view, delay in DELAY.items():
         found = attrs[f"camera_{view}_clock_offset"]
         middle = WAY + 6.0  # to which the offset belongs, about
-        truth = middle - (middle + OFFSET[view]) * (1 + DRIFT[view])
-        assert abs(found - truth) < 2e-3
+        assert abs(found - (middle - host_time(middle) - delay)) < 2e-3
+        assert abs(attrs[f"camera_{view}_clock_drift"] + DRIFT) < 1e-4
         assert 0 < attrs[f"camera_{view}_clock_offset_error"] < 5e-4
 
 
@@ -165,13 +166,64 @@ def test_a_killed_session_is_made_a_recording_and_cut_by_one_command(session, tm
 def test_repeated_samples_and_frames_do_no_harm(session):
     def repeat(samples, frames):
         samples[700:700] = samples[690:700]
-        frames["xz"][200:200] = [
-            f._replace(flags=int(Flag.REPEATED_IMAGE)) for f in frames["xz"][198:200]
-        ]
+        for k in (198, 199):
+            frames["xz"][k] = frames["xz"][197]._replace(
+                index=k, stamp=frames["xz"][k].stamp, flags=int(Flag.REPEATED_IMAGE)
+            )
 
     recording = bl.open_recording(finalise(session(change=repeat)))
     apart = recording.inclination - inclination(WAY + recording.time)
     assert np.degrees(np.nanmax(np.abs(apart))) < 0.15
+
+
+FAULT = 250  # frame of a stir of 12 s, in its middle
+
+
+def standing(rows):
+    return [frame._replace(stamp=rows[0].stamp) for frame in rows]
+
+
+def later(rows):
+    return [frame._replace(stamp=frame.stamp + 0.5) for frame in rows]
+
+
+def no_numbers(rows):
+    return [frame._replace(stamp=np.nan) for frame in rows]
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [(standing, "stand still"), (no_numbers, "stand still"), (later, "jump by 0.53 s")],
+)
+@pytest.mark.parametrize("view", ["xz", "yz"])
+def test_a_camera_whose_stamps_fail_ends_the_recording_and_is_named(session, view, change, told):
+    def fail(_, frames):
+        frames[view][FAULT - 1 :] = [
+            frames[view][FAULT - 1],
+            *change(frames[view][FAULT - 1 :])[1:],
+        ]
+
+    recording = bl.open_recording(finalise(session(change=fail)))
+    assert recording.time[-1] == pytest.approx(FAULT / 30 - WAY, abs=0.15)
+    reason = recording.attrs["reason"]
+    assert recording.attrs["status"] == "aborted"
+    assert f"view {view}" in reason and told in reason and f"frame {FAULT}" in reason
+    assert f"({(FAULT - 1) / 30:.1f} s)" in reason
+    apart = recording.inclination - inclination(WAY + recording.time)
+    assert np.degrees(np.nanmax(np.abs(apart))) < 0.15
+
+
+def test_pictures_may_be_lost_before_the_stir_and_for_less_than_half_a_second(session):
+    def lose(_, frames):
+        del frames["yz"][300:313], frames["yz"][10:30]
+
+    recording = bl.open_recording(path := finalise(session(change=lose)))
+    assert recording.attrs["status"] == "complete"
+    assert recording.attrs["camera_yz_lost_frames"] == 33
+    seen = np.isfinite(recording.inclination).all(axis=1)
+    assert (~seen).sum() == pytest.approx(13, abs=1)
+    with xarray.open_dataset(path) as dataset:
+        assert ((dataset["flags"].to_numpy() & int(Flag.GAP)) != 0).tolist() == (~seen).tolist()
 
 
 def no_frames(_, frames):

@@ -12,6 +12,8 @@ from bolfi_liquids.hardware.board import SPAWN, Board, Trouble, Who, host_time
 from bolfi_liquids.hardware.recorder.csv_file import CsvAppender, read_csv
 from bolfi_liquids.hardware.recorder.events import (
     RESERVE,
+    RESERVE_BYTES,
+    RESERVE_PARTS,
     EventLog,
     drop_reserve,
     make_reserve,
@@ -131,20 +133,21 @@ def test_the_reserve_serves_many_last_events_of_a_full_disk(tmp_path, monkeypatc
     write, room = os.write, [0]
 
     def full(file, data):
-        # each file that was given up leaves room for one write
-        room[0] = 16 - len(list((tmp_path / RESERVE).iterdir())) - len(read_events(tmp_path))
+        # each part that was given up leaves room for one write
+        parts = (tmp_path / RESERVE).stat().st_size // RESERVE_BYTES
+        room[0] = RESERVE_PARTS - parts - len(read_events(tmp_path))
         if room[0] <= 0:
             raise OSError(errno.ENOSPC, "No space left on device")
         return write(file, data)
 
     monkeypatch.setattr(os, "write", full)
-    for k in range(16):
+    for k in range(RESERVE_PARTS):
         log.write("stopped", k=k)
     with pytest.raises(OSError, match="No space"):
-        log.write("stopped", k=16)
+        log.write("stopped", k=RESERVE_PARTS)
     monkeypatch.undo()
     log.close()
-    assert [event["k"] for event in read_events(tmp_path)] == list(range(16))
+    assert [event["k"] for event in read_events(tmp_path)] == list(range(RESERVE_PARTS))
     drop_reserve(tmp_path)
     assert not (tmp_path / RESERVE).exists()
 

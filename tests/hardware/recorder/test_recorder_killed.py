@@ -20,9 +20,9 @@ from bolfi_liquids.hardware.recorder.sample import Sample  # noqa: E402
 from bolfi_liquids.hardware.recorder.views import camera_model  # noqa: E402
 from bolfi_liquids.hardware.rendering.drawing import prepare  # noqa: E402
 from bolfi_liquids.hardware.rendering.scene import Look, Scene  # noqa: E402
-from bolfi_liquids.hardware.rendering.world import MovingWorld  # noqa: E402
 from bolfi_liquids.hardware.rig_file import bundled_rig  # noqa: E402
 from bolfi_liquids.hardware.session.camera_process import WHO, run_camera  # noqa: E402
+from rendered_scenes import MovingWorld  # noqa: E402
 
 from bolfi_liquids.inputs.checks import check_values  # noqa: E402
 from bolfi_liquids.inputs.open import read_recording  # noqa: E402
@@ -48,7 +48,7 @@ def camera_of(view):
     stage = prepare(scene, camera_model(camera), Look(faults=0.02))
     time = ROBOT + host_time() + np.arange(-2.0, 40.0, 0.01)
     world = MovingWorld(*(CubicSpline(time, y) for y in motion(time)), offset=ROBOT)
-    return partial(RenderedCamera, stage, world, Timing(offset=50.0, seed=WHO[view]))
+    return partial(RenderedCamera, stage, world, Timing(seed=WHO[view]))
 
 
 class Sampler(threading.Thread):

@@ -11,7 +11,7 @@ from bolfi_liquids.hardware.board import Trouble, Who
 from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.robot.orders import Began, Checked, Done, Follow, Leave, Stop
-from bolfi_liquids.hardware.session.emulated_limits import patient
+from ur_controller.patience import patient
 
 RIG = bundled_rig()
 SHORT = {"rest": 0.1, "points": 5, "radius": 0.02}

@@ -5,7 +5,6 @@ import time
 import numpy as np
 import pytest
 from bolfi_liquids.hardware.board import SPAWN, Board, Row, Who, host_time
-from bolfi_liquids.hardware.emulator.process import EmulatorProcess
 from bolfi_liquids.hardware.motion.cup_frame import cup_frame
 from bolfi_liquids.hardware.motion.kinematics import forward, inverse
 from bolfi_liquids.hardware.motion.pour_paths import approach_pour, pour_path, ready_to_pour
@@ -32,11 +31,13 @@ from bolfi_liquids.hardware.robot.orders import (
 )
 from bolfi_liquids.hardware.robot.path_queue import Course, Leg, Trail, advanced, queued
 from bolfi_liquids.hardware.robot.sample_queue import Outlet
+from bolfi_liquids.hardware.robot.ur import URController
 from bolfi_liquids.hardware.safety.guards import Trip
 from bolfi_liquids.hardware.safety.limits import workspace
 from bolfi_liquids.hardware.safety.preflight import failures
-from bolfi_liquids.hardware.session.emulated_limits import patient
 from scipy.spatial.transform import Rotation
+from ur_controller.patience import patient
+from ur_controller.process import ControllerProcess
 
 RIG = patient(bundled_rig())
 SHORT = {"rest": 0.1, "points": 5, "radius": 0.02}
@@ -200,13 +201,13 @@ class Controlled:
         space = workspace(QUICK, "stirring")
         base = FRAME.to_base(stir(QUICK).pose[0])
         joints = inverse(space.arm, base, space.start, tcp=space.tcp).joints
-        self.emulator = EmulatorProcess.start(joints=joints, options={"seed": 1})
+        self.emulator = ControllerProcess.start(joints=joints, options={"seed": 1})
         self.directory = directory
         self.board = Board()
         self.link, its = SPAWN.Pipe()
         self.samples, writing = SPAWN.Pipe(duplex=False)
-        address = self.emulator.address
-        to = Assignment(QUICK, address, "stirring", True, str(directory), base[None], cameras=False)
+        controller, where = URController(self.emulator.address), str(directory)
+        to = Assignment(QUICK, controller, "stirring", True, where, base[None], cameras=False)
         self.process = SPAWN.Process(target=run_control, args=(to, self.board, its, writing))
         self.process.start()
         its.close()

@@ -1,3 +1,4 @@
+import os
 import re
 import subprocess
 import sys
@@ -6,14 +7,12 @@ import time
 import numpy as np
 import pytest
 from bolfi_liquids.hardware.arm import LinkLost
-from bolfi_liquids.hardware.emulator.process import EmulatorProcess
 from bolfi_liquids.hardware.errors import MotionRejected, RigError
 from bolfi_liquids.hardware.motion.cup_frame import cup_frame
-from bolfi_liquids.hardware.motion.kinematics import inverse
 from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.robot.ur import URArm, URReader
-from bolfi_liquids.hardware.safety.limits import workspace
+from ur_controller.process import FOLDER, ControllerProcess
 
 pytest.importorskip("rtde_control")
 
@@ -27,9 +26,7 @@ PERIOD = 1.0 / 125.0
 
 @pytest.fixture
 def emulator():
-    space = workspace(RIG, "stirring")
-    joints = inverse(space.arm, PATH[0], space.start, tcp=space.tcp).joints
-    with EmulatorProcess.start(joints=joints) as process:
+    with ControllerProcess.at_pose(RIG, stir(RIG).pose[0]) as process:
         yield process
 
 
@@ -184,7 +181,7 @@ def test_a_protective_stop_is_told_and_takes_no_set_point(arm, emulator):
 DROPPED = """
 import os, sys, time
 from bolfi_liquids.hardware.motion.cup_frame import cup_frame
-from bolfi_liquids.hardware.emulator.admin_client import Admin
+from ur_controller.admin_client import Admin
 from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.arm import LinkLost
@@ -216,7 +213,8 @@ os._exit(0)
 @keeps_time
 def test_after_a_dropped_link_nothing_is_sent_though_the_library_reconnects(emulator):
     command = [sys.executable, "-c", DROPPED, emulator.address]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    where = os.environ | {"PYTHONPATH": FOLDER}  # what the script imports
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=where)
     # none once the loss is seen, unless the library crashed first: then nobody is left to send
     assert re.search(r"taken \+{0,4}-+$", done.stdout) or done.returncode < 0, done.stdout
     assert wait_for_rest(emulator, 0.3)

@@ -21,7 +21,7 @@ class Answer(NamedTuple):
 ANSWERS = {
     "1": Answer(
         "constructors hold Python's lock",
-        "robot and emulator are processes of their own; main ends a control process that hangs",
+        "the arm has a process of its own; main ends a control process that hangs",
         (
             "session/session: control_process_that_hangs_is_ended",
             "session/session: leaves_nothing_behind",

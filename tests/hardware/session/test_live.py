@@ -2,11 +2,9 @@ import math
 
 import pytest
 from bolfi_liquids.hardware.board import Row, Trouble, Who
-from bolfi_liquids.hardware.session.live import (
-    LiveStatus,
-    Reading,
-    live_table,
-)
+from bolfi_liquids.hardware.robot.orders import Stopped
+from bolfi_liquids.hardware.session.live import Reading, live_table
+from bolfi_liquids.hardware.session.progress import Status
 from rich.console import Console
 
 ROWS = (
@@ -17,10 +15,14 @@ ROWS = (
 )
 
 
-def shown(status):
+def status_of(rows, *guards, stopped=None):
+    return Status(dict(zip(Who, rows, strict=True)), guards, None, (), (), stopped)
+
+
+def shown(title, status):
     console = Console(width=80, color_system=None)
     with console.capture() as capture:
-        console.print(live_table(status))
+        console.print(live_table(title, status, 10.0))
     lines = capture.get().splitlines()
     assert max(map(len, lines)) <= 80
     return {line.split("  ")[0].strip(): line for line in lines}
@@ -28,7 +30,7 @@ def shown(status):
 
 def test_all_is_shown_in_80_columns():
     guards = (Reading("force", 4.0, 20.0, "N"), Reading("tracking", 0.02, 0.01, "m"))
-    lines = shown(LiveStatus("star, cycle 1 of 3", 10.0, ROWS, guards))
+    lines = shown("star, cycle 1 of 3", status_of(ROWS, *guards))
     assert any("star, cycle 1 of 3" in line for line in lines.values())
     assert "42 %" in lines["path"]
     assert "+2.86°" in lines["stick"] and "-1.15°" in lines["stick"]
@@ -42,14 +44,15 @@ def test_all_is_shown_in_80_columns():
 
 def test_trouble_takes_the_place_of_numbers():
     rows = (*ROWS[:3], ROWS[3]._replace(trouble=Trouble.SAME_PICTURE, value=math.nan))
-    lines = shown(LiveStatus("star", 10.0, rows, message="camera yz shows the same picture"))
+    stopped = Stopped("camera yz shows the same picture", "camera yz")
+    lines = shown("star", status_of(rows, stopped=stopped))
     assert "same picture again" in lines["camera yz"]
     assert "yz not seen" in lines["stick"]
     assert "camera yz shows" in lines["stopped"]
 
 
 def test_nothing_has_begun():
-    lines = shown(LiveStatus("starting", 10.0, tuple(Row() for _ in Who)))
+    lines = shown("starting", status_of([Row() for _ in Who]))
     assert "0 %" in lines["path"]
     assert all("no sign yet" in lines[name] for name in ("robot", "recorder", "camera yz"))
 
@@ -58,12 +61,12 @@ def test_nothing_has_begun():
     ("value", "style"), [(4.0, "green"), (17.0, "yellow"), (20.0, "red"), (30.0, "red")]
 )
 def test_a_guard_changes_its_colour_before_it_stops_the_arm(value, style):
-    table = live_table(LiveStatus("", 10.0, ROWS, (Reading("force", value, 20.0, "N"),)))
+    table = live_table("", status_of(ROWS, Reading("force", value, 20.0, "N")), 10.0)
     cell = list(table.columns[1].cells)[-1]
     assert cell.style == style
 
 
 def test_an_old_sign_of_life_is_red():
     rows = (ROWS[0]._replace(beat=9.0), *ROWS[1:])
-    cells = list(live_table(LiveStatus("", 10.0, rows)).columns[1].cells)
+    cells = list(live_table("", status_of(rows), 10.0).columns[1].cells)
     assert (cells[3].style, cells[4].style) == ("red", "green")

@@ -9,26 +9,24 @@ from dataclasses import replace
 import numpy as np
 import psutil
 import pytest
-from bolfi_liquids.hardware.emulator.process import EmulatorProcess
 from bolfi_liquids.hardware.errors import MotionRejected, RigError
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
-from bolfi_liquids.hardware.motion.kinematics import inverse
 from bolfi_liquids.hardware.motion.stir_paths import insert, retract, stir
 from bolfi_liquids.hardware.recorder.events import read_events
 from bolfi_liquids.hardware.recorder.sample import SAMPLES
 from bolfi_liquids.hardware.rig_file import bundled_rig
-from bolfi_liquids.hardware.safety.limits import workspace
+from bolfi_liquids.hardware.robot.ur import URController
 from bolfi_liquids.hardware.safety.preflight import failures
 from bolfi_liquids.hardware.session.confirmation import (
     CONFIRMATION,
     Confirmation,
     confirm,
-    confirm_emulated,
     describe,
 )
 from bolfi_liquids.hardware.session.progress import Phase
 from bolfi_liquids.hardware.session.session import Session, SessionStopped
 from bolfi_liquids.hardware.session.setup import SessionSetup
+from ur_controller.patience import PatientSetup
+from ur_controller.process import FOLDER, ControllerProcess
 
 # an arm that moves, and the watchdog of its controller; the others keep no time
 keeps_time = pytest.mark.punctual
@@ -42,26 +40,14 @@ PLAN = [stir(RIG), retract(RIG)]
 @pytest.fixture
 def emulator():
     pytest.importorskip("rtde_control")
-    space = workspace(RIG, "stirring")
-    base = cup_frame(RIG.cup).to_base(PLAN[0].pose[0])
-    joints = inverse(space.arm, base, space.start, tcp=space.tcp).joints
-    options = {"tcp": str(list(RIG.robot.stirring_tcp))}
-    with EmulatorProcess.start(joints=joints, options=options) as process:
+    with ControllerProcess.at_pose(RIG, PLAN[0].pose[0]) as process:
         yield process
 
 
 def armed(emulator, directory):
-    leave = confirm_emulated(describe(PLAN, RIG, "stirring"), emulator.address)
-    setup = SessionSetup(
-        RIG,
-        directory,
-        emulator.address,
-        armed=True,
-        confirmation=leave,
-        plan=PLAN,
-        rehearsal=True,
-    )
-    return Session(setup)
+    arm = URController(emulator.address)
+    leave = confirm(describe(PLAN, RIG, "stirring"), CONFIRMATION, arm.address)
+    return Session(PatientSetup(RIG, directory, arm, armed=True, confirmation=leave, plan=PLAN))
 
 
 def lives(pid):
@@ -144,7 +130,7 @@ def test_a_confirmation_is_good_for_one_session(emulator, tmp_path):
 
 @keeps_time
 def test_a_session_is_a_dry_run_unless_it_is_armed_and_records_all_the_same(emulator, tmp_path):
-    with Session(SessionSetup(RIG, tmp_path, emulator.address)) as session:
+    with Session(SessionSetup(RIG, tmp_path, URController(emulator.address))) as session:
         assert failures(session.preflight()) == ""
         with pytest.raises(MotionRejected, match="dry run"):
             session.follow(PLAN[0])
@@ -156,13 +142,14 @@ def test_a_session_is_a_dry_run_unless_it_is_armed_and_records_all_the_same(emul
 
 
 def test_nobody_is_armed_without_a_confirmation(tmp_path):
+    other = URController("127.0.0.9")
     with pytest.raises(RigError, match="armed without a confirmation"):
-        SessionSetup(RIG, tmp_path, "127.0.0.9", armed=True)
+        SessionSetup(RIG, tmp_path, other, armed=True)
     with pytest.raises(RigError, match="armed without a confirmation"):
-        SessionSetup(RIG, tmp_path, "127.0.0.9", armed=True, confirmation="yes")  # type: ignore[arg-type]
+        SessionSetup(RIG, tmp_path, other, armed=True, confirmation="yes")  # type: ignore[arg-type]
     leave = confirm("plan", CONFIRMATION, "127.0.0.8")
     with pytest.raises(RigError, match="is for 127.0.0.8, the controller is at 127.0.0.9"):
-        SessionSetup(RIG, tmp_path, "127.0.0.9", armed=True, confirmation=leave)
+        SessionSetup(RIG, tmp_path, other, armed=True, confirmation=leave)
 
 
 @pytest.mark.parametrize("typed", ["", "y", "yes", CONFIRMATION.upper(), CONFIRMATION + "!"])
@@ -172,12 +159,6 @@ def test_only_the_sentence_confirms(typed):
     assert confirm("plan", f" {CONFIRMATION}\n", "127.0.0.8").plan == "plan"
     with pytest.raises(TypeError):
         Confirmation(object(), "plan", None)
-
-
-@pytest.mark.parametrize("address", ["192.168.1.10", "robot", "::2", "10.0.0.1"])
-def test_an_emulated_arm_is_on_this_computer(address):
-    with pytest.raises(RigError, match="typed confirmation"):
-        confirm_emulated("plan", address)
 
 
 def test_the_plan_tells_where_how_fast_and_how_long():
@@ -243,12 +224,14 @@ def test_a_control_process_that_hangs_is_ended(emulator, tmp_path):
 
 def test_no_controller_is_a_line_of_the_list(tmp_path):
     pytest.importorskip("rtde_control")
-    with Session(SessionSetup(RIG, tmp_path, "127.88.77.66")) as session:
+    with Session(SessionSetup(RIG, tmp_path, URController("127.88.77.66"))) as session:
         assert "controller: robot.host = 127.88.77.66" in failures(session.preflight())
         assert session.phase is Phase.REFUSED
         with pytest.raises(RigError, match="pre-flight"):
             session.pose()
 
+
+FINDING = os.environ | {"PYTHONPATH": FOLDER}  # what the script imports
 
 # a script that ends in the way that its second argument says, while the arm stirs
 ENDING = """
@@ -256,18 +239,17 @@ import os, signal, sys, time
 from pathlib import Path
 from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.rig_file import bundled_rig
-from bolfi_liquids.hardware.session.confirmation import confirm_emulated
+from bolfi_liquids.hardware.robot.ur import URController
+from bolfi_liquids.hardware.session.confirmation import CONFIRMATION, confirm
 from bolfi_liquids.hardware.session.session import Session
-from bolfi_liquids.hardware.session.setup import SessionSetup
+from ur_controller.patience import PatientSetup
 
 if __name__ == "__main__":
     address, way, directory = sys.argv[1:]
     rig = bundled_rig()
     rig = rig.model_copy(update={"stirring": rig.stirring.model_copy(update={"rest": 0.1})})
-    leave = confirm_emulated("", address)
-    setup = SessionSetup(
-        rig, Path(directory), address, armed=True, confirmation=leave, rehearsal=True
-    )
+    leave, arm = confirm("", CONFIRMATION, address), URController(address)
+    setup = PatientSetup(rig, Path(directory), arm, armed=True, confirmation=leave)
     session = Session(setup)
     session.start()
     session.follow(stir(rig))
@@ -288,7 +270,7 @@ def test_however_main_ends_the_arm_stops(emulator, tmp_path, way):
     script.write_text(ENDING)
     recording = tmp_path / "recording"
     command = [sys.executable, str(script), emulator.address, way, str(recording)]
-    subprocess.run(command, timeout=60.0, stderr=subprocess.DEVNULL, check=False)
+    subprocess.run(command, timeout=60.0, stderr=subprocess.DEVNULL, check=False, env=FINDING)
     end = time.monotonic() + 10.0
     while time.monotonic() < end and not emulator.admin.state().at_rest:
         time.sleep(0.02)
@@ -302,13 +284,15 @@ import signal
 import sys
 from pathlib import Path
 from bolfi_liquids.hardware.rig_file import bundled_rig
+from bolfi_liquids.hardware.robot.ur import URController
 from bolfi_liquids.hardware.session.session import Session
 from bolfi_liquids.hardware.session.setup import SessionSetup
 
 if __name__ == "__main__":
     # a shell's background jobs are started deaf to it
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    with Session(SessionSetup(bundled_rig(), Path(sys.argv[2]), sys.argv[1])) as session:
+    arm = URController(sys.argv[1])
+    with Session(SessionSetup(bundled_rig(), Path(sys.argv[2]), arm)) as session:
         print("started", flush=True)
         session.preflight()
         session.wait(0, timeout=20.0)

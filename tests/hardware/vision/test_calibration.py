@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware.rendering import render_board, render_plumb_line
 from bolfi_liquids.hardware.vision import (
     CalibrationError,
     CameraModel,
@@ -14,6 +13,7 @@ from bolfi_liquids.hardware.vision import (
     level_camera,
     look_at,
 )
+from rendered_boards import render_board, render_plumb_line
 from scipy.spatial.transform import Rotation
 
 cv2 = pytest.importorskip("cv2")

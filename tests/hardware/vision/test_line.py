@@ -6,29 +6,23 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.rendering import (
     BRIGHT_STICK,
-    CLEAN,
     Look,
     WorldState,
     direction,
     fault_of,
     prepare,
-    rehearsal_camera,
-    rehearsal_scene,
     render,
-    stick_view,
 )
 from bolfi_liquids.hardware.vision import (
     CameraModel,
     Flag,
     Frame,
     FrameMeter,
-    StickView,
     Track,
-    ViewError,
     line_is_good,
-    marker_is_good,
     measure,
 )
+from rendered_scenes import CLEAN, rehearsal_camera, rehearsal_scene, stick_view
 
 cv2 = pytest.importorskip("cv2")
 
@@ -58,7 +52,7 @@ class Bench:
         return float(np.arctan2(*np.diff([x / z, y / z]).ravel()))
 
     def measure(self, image, track: Track | None = None):
-        return measure(Frame(0, 0.0, 0.0, image), self.view, track or Track())[0]
+        return measure(Frame(0, 0.0, image), self.view, track or Track())[0]
 
 
 def random_pose(rng, most_deg: float):
@@ -126,7 +120,7 @@ def test_without_the_mask_a_deep_liquid_would_bend_the_line():
     bench.stage, bench.view = prepare(scene, bench.camera, CLEAN), stick_view(scene, bench.camera)
     image, truth = bench.picture((5.0, 0.0)), bench.truth((5.0, 0.0))
     blind = dataclasses.replace(bench.view, surface_height=0.0)
-    bent = measure(Frame(0, 0.0, 0.0, image), blind, Track())[0]
+    bent = measure(Frame(0, 0.0, image), blind, Track())[0]
     masked = bench.measure(image)
     assert masked.flags == 0
     assert abs(np.degrees(masked.angle - truth)) < 0.02
@@ -193,7 +187,7 @@ def test_a_thicker_or_thinner_rod_is_not_our_stick():
     image = bench.picture((0.0, 0.0))
     for radius in (0.0028, 0.0075):
         other = dataclasses.replace(bench.view, stick_radius=radius)
-        flags = measure(Frame(0, 0.0, 0.0, image), other, Track())[0].flags
+        flags = measure(Frame(0, 0.0, image), other, Track())[0].flags
         assert not line_is_good(flags)
 
 
@@ -208,18 +202,18 @@ def test_a_second_stick_makes_the_picture_ambiguous():
 def test_a_line_beside_the_pivot_is_flagged():
     bench = Bench(FAULTLESS)
     wrong = dataclasses.replace(bench.view, marker_offset=(0.0035, -0.02, 0.025))
-    found = measure(Frame(0, 0.0, 0.0, bench.picture((0.0, 0.0))), wrong, Track())[0]
+    found = measure(Frame(0, 0.0, bench.picture((0.0, 0.0))), wrong, Track())[0]
     assert Flag.OFF_PIVOT in Flag(found.flags)
 
 
 def test_a_hidden_marker_leaves_the_line_good():
     bench = Bench(FAULTLESS)
-    _, track = measure(Frame(0, 0.0, 0.0, bench.picture((5.0, 0.0))), bench.view, Track())
+    _, track = measure(Frame(0, 0.0, bench.picture((5.0, 0.0))), bench.view, Track())
     image = bench.picture((6.0, 0.0), (0.006, 0.0, 0.235))
     image[:95, 260:420] = 60
-    found, _ = measure(Frame(1, 1 / 30, 0.0, image), bench.view, track)
+    found, _ = measure(Frame(1, 1 / 30, image), bench.view, track)
     assert Flag(found.flags) == Flag.NO_MARKER
-    assert line_is_good(found.flags) and not marker_is_good(found.flags)
+    assert line_is_good(found.flags) and found.flags & Flag.NO_MARKER
     expected = bench.truth((6.0, 0.0), (0.006, 0.0, 0.235))
     assert np.degrees(found.angle - expected) == pytest.approx(0.0, abs=0.03)
 
@@ -229,7 +223,7 @@ def test_jumps_and_repeated_pictures_are_flagged_by_the_meter():
     meter = FrameMeter(bench.view)
 
     def flags(index, image):
-        return Flag(meter.measure(Frame(index, index / 30, 0.0, image)).flags)
+        return Flag(meter.measure(Frame(index, index / 30, image)).flags)
 
     first = bench.picture((2.0, 0.0))
     assert flags(0, first) == 0
@@ -249,16 +243,6 @@ def test_a_picture_of_another_size_is_refused():
         bench.measure(np.zeros((240, 320), np.uint8))
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("stick_radius", 0.0), ("marker_radius", float("nan")), ("contrast", "grey")],
-)
-def test_impossible_views_are_refused(name, value):
-    view: StickView = Bench(CLEAN).view
-    with pytest.raises(ViewError, match=name):
-        dataclasses.replace(view, **{name: value})
-
-
 def gross_errors(frames: int, seed: int) -> tuple[float, float, float, float]:
     """RMS and greatest error [deg] of lines that pass for good, normalised RMS, share flagged."""
     errors, normalised, flagged = [], [], 0
@@ -271,7 +255,7 @@ def gross_errors(frames: int, seed: int) -> tuple[float, float, float, float]:
             inclination = amplitude * np.sin(2 * np.pi * np.array([0.31, 0.47]) * k / 30 + phase)
             pivot = (*(0.025 * np.sin([0.11 * k, 0.13 * k])), 0.235)
             fault = fault_of(k, 0.1, bench.stage.area, seed + number)
-            frame = Frame(k, k / 30, 0.0, bench.picture(inclination, pivot, fault))
+            frame = Frame(k, k / 30, bench.picture(inclination, pivot, fault))
             found = meter.measure(frame)
             if line_is_good(found.flags):
                 errors.append(np.degrees(found.angle - bench.truth(inclination, pivot)))

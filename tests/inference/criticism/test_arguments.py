@@ -40,7 +40,12 @@ GOOD = {
         ("level", 5),
         ("level", np.nan),
         ("plan", 3),
-        ("keeping", "runs.sqlite"),
+        ("bank", 3),
+        ("executor", 3),
+        ("batch", 0),
+        ("seed", -1),
+        ("timeout", -1.0),
+        ("report", "loud"),
     ],
 )
 def test_a_criticism_refuses_what_makes_no_sense(argument, value):
@@ -63,8 +68,6 @@ def test_a_criticism_refuses_what_makes_no_sense(argument, value):
         (lambda: criticism.Plan(base=-1), "base"),
         (lambda: criticism.Plan(extension=1), "extension"),
         (lambda: criticism.Plan(most=None), "most"),
-        (lambda: criticism.Keeping(bank="runs.sqlite"), "bank"),
-        (lambda: criticism.Keeping(executor=3), "executor"),
     ],
 )
 def test_its_parts_refuse_what_makes_no_sense(make, argument):

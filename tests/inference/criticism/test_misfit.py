@@ -13,6 +13,7 @@ from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws
 from bolfi_liquids.inference.criticism.search import Study, examine
 from bolfi_liquids.inference.criticism.simulate import SimulatorRuns
 from bolfi_liquids.inference.criticism.usual_residual import REPEATED
+from bolfi_liquids.inference.simulations import Compute
 from bolfi_liquids.inference.surrogates.emulator import latent_covariance
 from scipy.stats import binom, kstest, norm
 
@@ -61,9 +62,8 @@ def observe(simulate, number, bump=0.0):
 
 
 def examined(simulate, observed, bank):
-    with criticism.Keeping(batch=64).opened("") as keep:
-        simulator = SimulatorRuns(simulate, PRIOR, EXTENSIONS, keep, bank)
-        return examine(Study(simulator, observed, NOISE, criticism.Plan()), None)[0]
+    simulator = SimulatorRuns(simulate, PRIOR, EXTENSIONS, Compute(batch=64), bank)
+    return examine(Study(simulator, observed, NOISE, criticism.Plan()), None)[0]
 
 
 def on(hypothesis, observed):
@@ -278,9 +278,8 @@ def test_what_clean_data_show_as_well_is_no_discovery(banks):
 def test_a_prior_says_on_which_side_an_effect_can_act(low, high, side):
     extensions = {"bump": criticism.Extension(dist.Uniform(low, high))}
     observed = observe(exact, 3)
-    with criticism.Keeping(batch=64).opened("") as keep:
-        simulator = SimulatorRuns(exact, PRIOR, extensions, keep)
-        found = examine(Study(simulator, observed, NOISE, criticism.Plan()), None)[0].signatures
+    simulator = SimulatorRuns(exact, PRIOR, extensions, Compute(batch=64))
+    found = examine(Study(simulator, observed, NOISE, criticism.Plan()), None)[0].signatures
     assert found["bump"].side == side
     assert found["bump"].change @ BUMP > 0.0  # towards a greater coefficient, on either side
 

@@ -9,6 +9,7 @@ from bolfi_liquids.inference.criticism.posterior import weighted_posterior
 from bolfi_liquids.inference.criticism.prior_boxes import PriorBox, fill, hull, intersection, sides
 from bolfi_liquids.inference.criticism.search import Study, examine, explain
 from bolfi_liquids.inference.criticism.simulate import SimulatorRuns
+from bolfi_liquids.inference.simulations import Compute
 
 from bolfi_liquids import inference
 
@@ -26,8 +27,7 @@ def ramp(theta, seeds):
 
 @pytest.fixture
 def simulator():
-    with criticism.Keeping(batch=64).opened("") as keep:
-        yield SimulatorRuns(ramp, PRIOR, EXTENSIONS, keep)
+    return SimulatorRuns(ramp, PRIOR, EXTENSIONS, Compute(batch=64))
 
 
 def observed(level, size=0.0):

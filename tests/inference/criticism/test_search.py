@@ -13,6 +13,7 @@ from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.next_experiment import suggest
 from bolfi_liquids.inference.criticism.search import REFIT_PASSES
 from bolfi_liquids.inference.criticism.simulate import AllRunsFailed, SimulatorRuns, phase_seeds
+from bolfi_liquids.inference.simulations import Compute
 
 from bolfi_liquids import inference
 
@@ -98,8 +99,8 @@ def criticised(bank):
     """(fitted, ...) -> Criticism, all runs in one bank."""
 
     def call(fitted, extensions=EXTENSIONS, **asked):
-        keeping = criticism.Keeping(bank=bank, batch=64)
-        return criticism.criticise(fitted, PRIOR, extensions, plan=PLAN, keeping=keeping, **asked)
+        how = {"plan": PLAN, "bank": bank, "batch": 64}
+        return criticism.criticise(fitted, PRIOR, extensions, **how, **asked)
 
     return call
 
@@ -151,9 +152,9 @@ class LostWithTheFirstEffect(Executor):
 
 def test_workers_that_are_lost_are_no_effect_that_fails():
     """Else a run that was interrupted would conclude that no effect can be tested."""
-    keeping = criticism.Keeping(executor=LostWithTheFirstEffect())
+    how = {"plan": PLAN, "executor": LostWithTheFirstEffect()}
     with pytest.raises(RuntimeError, match="lost its workers"):
-        criticism.criticise(experiment(drift=0.06), PRIOR, EXTENSIONS, plan=PLAN, keeping=keeping)
+        criticism.criticise(experiment(drift=0.06), PRIOR, EXTENSIONS, **how)
 
 
 def test_the_same_call_simulates_nothing_again_and_concludes_the_same(
@@ -310,8 +311,7 @@ def test_effects_that_look_alike_are_tied_and_the_experiment_that_separates_them
 
 @pytest.fixture
 def simulator():
-    with criticism.Keeping().opened("") as keep:
-        yield SimulatorRuns(oscillate, PRIOR, EXTENSIONS, keep)
+    return SimulatorRuns(oscillate, PRIOR, EXTENSIONS, Compute(batch=4))
 
 
 def test_runs_of_a_phase_differ_by_their_parameters_alone(simulator):

@@ -10,6 +10,7 @@ import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.verdict import conclude, near_best
+from bolfi_liquids.inference.simulations import open_compute
 
 from bolfi_liquids import inference
 
@@ -197,12 +198,13 @@ class Client:
         return {}
 
 
-def own_residual(keeping):
-    return criticism.own_residual(experiment(np.arange(20.0)), PRIOR, DRAG, keeping)
+def own_residual(executor):
+    with open_compute(executor) as compute:
+        criticism.own_residual(experiment(np.arange(20.0)), PRIOR, DRAG, compute)
 
 
-def criticise(keeping):
-    return criticism.criticise(experiment(np.arange(20.0)), PRIOR, DRAG, keeping=keeping)
+def criticise(executor):
+    criticism.criticise(experiment(np.arange(20.0)), PRIOR, DRAG, executor=executor)
 
 
 @pytest.mark.parametrize("call", [criticise, own_residual])
@@ -211,27 +213,9 @@ def test_an_executor_is_what_it_is_for_a_fit(call):
     with ThreadPoolExecutor(1) as pool:
         client = Client(pool)
         with pytest.raises(RuntimeError, match="AssertionError: simulated"):
-            call(criticism.Keeping(executor=client))
+            call(client)
     assert client.asked == [{"pure": False}]
     forking = multiprocessing.get_context("fork")
     with ProcessPoolExecutor(1, mp_context=forking) as pool:
         with pytest.raises(ValueError, match="fork"):
-            call(criticism.Keeping(executor=pool))
-
-
-def test_a_bank_that_is_opened_is_closed_and_one_that_is_given_stays_open():
-    with criticism.Keeping().opened("") as keep:
-        assert len(keep.bank) == 0
-    assert "closed" in repr(keep.bank)
-    with inference.SimulationBank() as bank:
-        with criticism.Keeping(bank).opened("drag") as keep:
-            assert keep.bank is bank and keep.identity == "drag"
-        assert len(bank) == 0
-
-
-@pytest.mark.parametrize(
-    "given", [{"batch": 0}, {"batch": None}, {"seed": -1}, {"timeout": -1.0}, {"report": "loud"}]
-)
-def test_simulations_that_cannot_be_made_so_are_refused(given):
-    with pytest.raises(ValueError, match=f"{next(iter(given))} must be"):
-        criticism.Keeping(**given)
+            call(pool)

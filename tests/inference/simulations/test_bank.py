@@ -8,10 +8,12 @@ from contextlib import closing
 import numpy as np
 import pytest
 from bolfi_liquids.inference import simulations
-from bolfi_liquids.inference.simulations import Keep, run_missing
+from bolfi_liquids.inference.simulations import Compute, open_compute, run_missing
+from bolfi_liquids.inference.simulations.failures import raised
 
 from bolfi_liquids import inference
 
+BOOM = raised(OSError("boom"))
 THETA = {"b": 0.1 + 0.2, "a": 1e-3}
 
 
@@ -52,8 +54,8 @@ def test_looks_up_exactly(identity, theta, seed):
 
 def test_keeps_failures_until_a_signal_comes_and_then_that():
     with inference.SimulationBank() as bank:
-        bank.put("id", THETA, 0, simulations.Simulation(None, "boom", 0.0))
-        assert bank.get("id", THETA, 0) == simulations.Simulation(None, "boom", 0.0)
+        bank.put("id", THETA, 0, simulations.Simulation(None, BOOM, 0.0))
+        assert bank.get("id", THETA, 0) == simulations.Simulation(None, BOOM, 0.0)
         for value in (1.0, 2.0):
             bank.put("id", THETA, 0, simulations.Simulation(np.full(2, value), None, 0.0))
         kept = bank.get("id", THETA, 0)
@@ -117,7 +119,7 @@ def test_all_simulations_of_one_identity(tmp_path):
                 bank.put(
                     identity, {"b": 1.0, "a": a}, seed, simulations.Simulation(signal, None, 0.0)
                 )
-            bank.put("id", {"b": 2.0, "a": 0.0}, 7, simulations.Simulation(None, "boom", 0.0))
+            bank.put("id", {"b": 2.0, "a": 0.0}, 7, simulations.Simulation(None, BOOM, 0.0))
             found.append(bank.simulations("id"))
     for kept in found:
         np.testing.assert_array_equal(kept.theta["a"], [0.1, 0.1, 0.3])
@@ -185,7 +187,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from bolfi_liquids import inference
 from bolfi_liquids.inference import simulations
-from bolfi_liquids.inference.simulations import Keep, run_missing
+from bolfi_liquids.inference.simulations import Compute, run_missing
 
 def simulate(theta, seeds):
     time.sleep(0.02)
@@ -200,9 +202,9 @@ with inference.SimulationBank(sys.argv[1]) as bank, ThreadPoolExecutor(3) as poo
     if sys.argv[4] == "alone":
         made = []
         for first in range(0, 40, 4):
-            made += run_missing(simulate, jobs[first : first + 4], Keep(bank))
+            made += run_missing(simulate, jobs[first : first + 4], Compute(bank=bank))
     else:
-        made = run_missing(simulate, jobs, Keep(bank, executor=pool), (1,))
+        made = run_missing(simulate, jobs, Compute(bank=bank, executor=pool), (1,))
 assert [m.signal[0] for m in made] == [job.seed + 0.5 for job in jobs]
 """
 
@@ -235,9 +237,9 @@ def test_results_come_in_order_and_batches_are_kept_as_they_finish(batch, calls)
 
     with inference.SimulationBank() as bank:
         with pytest.raises(KeyboardInterrupt):
-            run_missing(simulate, jobs, Keep(bank, batch=batch), advance=interrupted)
+            run_missing(simulate, jobs, Compute(bank=bank, batch=batch), advance=interrupted)
         assert kept == ([7] * 4 if batch is None else [3, 3, 3, 6])
-        found = run_missing(simulate, jobs, Keep(bank, batch=batch), (1,))
+        found = run_missing(simulate, jobs, Compute(bank=bank, batch=batch), (1,))
         assert made == calls  # nothing twice
         assert [one.signal[0] for one in found] == [job.seed + 0.5 for job in jobs]
 
@@ -252,7 +254,11 @@ def test_an_executor_takes_jobs_one_by_one_whatever_the_batch():
     jobs = [simulations.Job({"a": 1.0}, seed) for seed in range(6)]
     with inference.SimulationBank() as bank, ThreadPoolExecutor(2) as pool:
         found = run_missing(
-            simulate, jobs, Keep(bank, batch=4, executor=pool), (1,), advance=finished.append
+            simulate,
+            jobs,
+            Compute(bank=bank, batch=4, executor=pool),
+            (1,),
+            advance=finished.append,
         )
     assert [one.signal[0] for one in found] == [job.seed + 0.5 for job in jobs]
     assert made == finished == [1] * 6
@@ -271,7 +277,7 @@ def test_what_was_finished_just_before_the_claim_is_not_simulated():
 
     with Busy() as bank:
         for _ in range(2):
-            (found,) = run_missing(simulate, [simulations.Job(THETA, 0)], Keep(bank), (1,))
+            (found,) = run_missing(simulate, [simulations.Job(THETA, 0)], Compute(bank=bank), (1,))
             np.testing.assert_array_equal(found.signal, [7.0])
         assert bank.claim("", THETA, 0)  # nobody holds it any more
 
@@ -285,7 +291,7 @@ def test_the_same_job_twice_in_a_batch_is_simulated_once():
 
     with inference.SimulationBank() as bank:
         batch = [simulations.Job(THETA, seed) for seed in (0, 1, 0)]
-        found = run_missing(simulate, batch, Keep(bank), (1,))
+        found = run_missing(simulate, batch, Compute(bank=bank), (1,))
     assert calls == [0, 1] and [result.signal[0] for result in found] == [THETA["a"]] * 3
 
 
@@ -311,3 +317,21 @@ def test_a_damaged_row_counts_as_not_simulated(tmp_path, caplog, change):
         assert "damaged row" in caplog.text
         bank.put("line", THETA, 0, made)
         np.testing.assert_array_equal(bank.get("line", THETA, 0).signal, made.signal)
+
+
+def test_a_bank_that_is_opened_is_closed_and_one_that_is_given_stays_open(tmp_path):
+    with open_compute(bank=tmp_path / "runs.sqlite") as compute:
+        assert len(compute.bank) == 0
+    assert "closed" in repr(compute.bank)
+    with inference.SimulationBank() as bank:
+        with open_compute(bank=bank) as compute:
+            assert compute.bank is bank
+        assert len(bank) == 0
+
+
+@pytest.mark.parametrize(
+    "given", [{"batch": 0}, {"timeout": -1.0}, {"executor": 3}, {"bank": 3}, {"bank": ""}]
+)
+def test_simulations_that_cannot_be_made_so_are_refused(given):
+    with pytest.raises(ValueError, match=next(iter(given))), open_compute(**given):
+        pass

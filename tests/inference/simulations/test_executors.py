@@ -321,11 +321,11 @@ def simulate(theta, seeds):
 if __name__ == "__main__":
     import jax
     from bolfi_liquids import inference
-    from bolfi_liquids.inference.simulations import Job, Keep, run_missing
+    from bolfi_liquids.inference.simulations import Job, Compute, run_missing
     jobs = [Job({"a": 1.0}, 0)]
     with ProcessPoolExecutor(1, mp_context=get_context(sys.argv[1])) as pool:
         with inference.SimulationBank() as bank:
-            print(run_missing(simulate, jobs, Keep(bank, executor=pool), (5,))[0].signal)
+            print(run_missing(simulate, jobs, Compute(bank=bank, executor=pool), (5,))[0].signal)
 """
 
 

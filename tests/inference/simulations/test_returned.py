@@ -14,8 +14,15 @@ import pandas as pd
 import pytest
 import xarray as xr
 from bolfi_liquids.inference.arguments import Unusable, checked_integer, float64
-from bolfi_liquids.inference.simulations import Job, Keep, OneByOne, Simulation, jobs, run_missing
-from bolfi_liquids.inference.simulations.failures import Failure, kind
+from bolfi_liquids.inference.simulations import (
+    Compute,
+    Job,
+    OneByOne,
+    Simulation,
+    jobs,
+    run_missing,
+)
+from bolfi_liquids.inference.simulations.failures import FailureKind
 from bolfi_liquids.inference.simulations.job import BATCH
 from dask.array.ma import masked_array as masked_chunks
 from distributed import LocalCluster
@@ -194,7 +201,9 @@ def test_a_run_without_a_signal_costs_itself_alone(worker_side, place, single, s
             made = OneByOne(worker_side.One(how, SPOILT_SEED)) if single else None
             simulate = made or worker_side.Many(how, SPOILT_SEED)
             with inference.SimulationBank() as bank:
-                found = run_missing(simulate, JOBS, Keep(bank, "", 4, executor), shape)
+                found = run_missing(
+                    simulate, JOBS, Compute(bank=bank, batch=4, executor=executor), shape
+                )
                 kept = bank.get("", JOBS[2].theta, SPOILT_SEED)
             for job, one in zip(JOBS, found, strict=True):
                 if job.seed != SPOILT_SEED:
@@ -204,9 +213,10 @@ def test_a_run_without_a_signal_costs_itself_alone(worker_side, place, single, s
                     )
                     continue
                 assert one.signal is None and one.error is not None, how
-                assert kind(one.error) is Failure.UNUSABLE
-                assert str(job.theta["a"]) in one.error and str(SPOILT_SEED) in one.error
-                assert "(4,)" in one.error or "(1, 4)" in one.error or how != "shorter"
+                assert one.error.kind is FailureKind.UNUSABLE
+                text = one.error.text
+                assert str(job.theta["a"]) in text and str(SPOILT_SEED) in text
+                assert "(4,)" in text or "(1, 4)" in text or how != "shorter"
             if shape is not None:
                 assert kept is None  # the next call tries it again
 
@@ -272,7 +282,7 @@ def test_another_simulator_s_signal_in_the_bank_costs_itself_alone():
     with inference.SimulationBank() as bank:
         bank.put("", JOBS[3].theta, JOBS[3].seed, Simulation(np.zeros(9), None, 0.0))
         found = run_missing(
-            lambda theta, seeds: np.zeros((len(seeds), 5)), JOBS, Keep(bank, "", 4), (5,)
+            lambda theta, seeds: np.zeros((len(seeds), 5)), JOBS, Compute(bank=bank, batch=4), (5,)
         )
     assert [one.signal is None for one in found] == [False] * 3 + [True] + [False] * 4
     assert "(9,)" in str(found[3].error)
@@ -289,7 +299,7 @@ def test_a_simulator_of_single_runs_gets_python_s_own_numbers(place):
         return [random.random()]
 
     with place() as executor, inference.SimulationBank() as bank:
-        run_missing(OneByOne(simulate), JOBS, Keep(bank, "", 4, executor), (1,))
+        run_missing(OneByOne(simulate), JOBS, Compute(bank=bank, batch=4, executor=executor), (1,))
     assert got == [int] * len(JOBS)
 
 
@@ -320,7 +330,7 @@ def test_a_bad_signal_among_those_that_are_told_is_a_failed_run(prior, observed,
     good = list(simulate(theta, range(6)))
     engine.tell(theta, [good[0], None, good[2][:29], good[3] + 0j, good[4], "diverged"])
     assert engine.told == 6 and engine.succeeded == 2
-    assert [kind(error) for error in engine.errors] == [Failure.UNUSABLE] * 4
+    assert [error.partition(":")[0] for error in engine.errors] == ["unusable"] * 4
     with pytest.raises(ValueError, match=r"signals must have shape \(6, 30\)|array of numbers"):
         engine.tell(theta, [row[:29] for row in good])
     assert engine.told == 6

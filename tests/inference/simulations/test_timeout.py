@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from bolfi_liquids.inference import SimulationBank
-from bolfi_liquids.inference.simulations import Job, Keep, OneByOne, Simulation, run_missing
+from bolfi_liquids.inference.simulations import Compute, Job, OneByOne, Simulation, run_missing
 from bolfi_liquids.inference.simulations.failures import timed_out
 from bolfi_liquids.inference.simulations.job import run_batch, simulation_seed
 
@@ -41,7 +41,7 @@ def stuck_at(which, forever, calls=None):
 def test_one_that_takes_too_long_is_given_up(forever):
     started = time.monotonic()
     found = run_batch(stuck_at(2, forever), [JOBS[2]], (1,), 0.1)
-    assert found == [Simulation(None, "timeout: no signal after 0.1 s", 0.1)]
+    assert found == [Simulation(None, timed_out(0.1), 0.1)]
     assert 0.1 <= time.monotonic() - started < 10.0
 
 
@@ -73,7 +73,7 @@ def test_what_the_simulator_raises_is_told_from_a_timeout(error, timeout):
 
     (found,) = run_batch(simulate, JOBS[:1], (1,), timeout)
     assert found.signal is None and found.error is not None
-    assert found.error.startswith(f"{type(error).__name__}: {error} (test_timeout.py, line ")
+    assert found.error.text.startswith(f"{type(error).__name__}: {error} (test_timeout.py, line ")
 
 
 def test_an_error_that_is_no_text_is_kept_all_the_same():
@@ -81,21 +81,23 @@ def test_an_error_that_is_no_text_is_kept_all_the_same():
         raise OSError("cannot read \udcff.dat")  # how Python spells a file name that is not UTF-8
 
     with SimulationBank() as bank:
-        (found,) = run_missing(simulate, JOBS[:1], Keep(bank), (1,))
+        (found,) = run_missing(simulate, JOBS[:1], Compute(bank=bank), (1,))
         assert bank.get("", *JOBS[0]) == found
-    assert found.error.startswith(r"OSError: cannot read \udcff.dat (")
+    assert found.error.text.startswith(r"OSError: cannot read \udcff.dat (")
 
 
 @pytest.mark.parametrize(("allowed", "again"), [(0.05, False), (0.1, False), (9.0, True)])
 def test_a_timeout_is_final_until_more_time_is_allowed(forever, allowed, again):
     calls = []
     with SimulationBank() as bank:
-        first = run_missing(stuck_at(0, forever), JOBS[:1], Keep(bank, timeout=0.1))
-        then = run_missing(stuck_at(-1, forever, calls), JOBS[:1], Keep(bank, timeout=allowed))
+        first = run_missing(stuck_at(0, forever), JOBS[:1], Compute(bank=bank, timeout=0.1))
+        then = run_missing(
+            stuck_at(-1, forever, calls), JOBS[:1], Compute(bank=bank, timeout=allowed)
+        )
         assert bool(calls) == again
         assert (then == first) == (not again)
         # no limit is more time than any
-        (last,) = run_missing(stuck_at(-1, forever), JOBS[:1], Keep(bank))
+        (last,) = run_missing(stuck_at(-1, forever), JOBS[:1], Compute(bank=bank))
     np.testing.assert_array_equal(last.signal, [0.0])
 
 
@@ -122,7 +124,7 @@ class Patient:
 def test_a_simulator_that_stops_itself_stays_in_its_thread(seconds, error):
     patient = Patient(seconds)
     with SimulationBank() as bank:
-        (found,) = run_missing(patient.simulate, JOBS[:1], Keep(bank, timeout=0.1))
+        (found,) = run_missing(patient.simulate, JOBS[:1], Compute(bank=bank, timeout=0.1))
     assert found.error == error
     assert patient.threads == {threading.current_thread()}
 
@@ -138,7 +140,7 @@ class PatientOnce(Patient):
 def test_a_simulator_of_single_runs_stops_itself_as_well(seconds, error):
     patient = PatientOnce(seconds)
     with SimulationBank() as bank:
-        keep = Keep(bank, timeout=0.1)
+        keep = Compute(bank=bank, timeout=0.1)
         (found,) = run_missing(OneByOne(patient.simulate), JOBS[:1], keep)
     assert found.error == error
     assert patient.threads == {threading.current_thread()}
@@ -198,7 +200,7 @@ def test_the_clock_runs_in_the_worker(tmp_path, monkeypatch):
     batch = [Job({"a": 0.3}, seed) for seed in range(4)] + [Job({"a": 30.0}, 4)]
     context = multiprocessing.get_context("spawn")
     with SimulationBank() as bank, ProcessPoolExecutor(1, mp_context=context) as pool:
-        found = run_missing(sleeper.sleep, batch, Keep(bank, executor=pool, timeout=0.9))
+        found = run_missing(sleeper.sleep, batch, Compute(bank=bank, executor=pool, timeout=0.9))
     assert [result.error for result in found] == [None] * 4 + [timed_out(0.9)]
 
 
@@ -208,7 +210,7 @@ def test_bad_timeouts_are_refused(prior, observed, simulate, timeout):
         inference.fit(simulate, prior, observed, timeout=timeout)
     with SimulationBank() as bank:
         with pytest.raises(ValueError, match="timeout must be positive and finite"):
-            run_missing(simulate, JOBS, Keep(bank, timeout=timeout))
+            run_missing(simulate, JOBS, Compute(bank=bank, timeout=timeout))
 
 
 @pytest.mark.parametrize("batch", [0, -1, 2.0])
@@ -217,4 +219,4 @@ def test_bad_batches_are_refused(batch):
     with SimulationBank() as bank:
         for jobs in (JOBS, []):
             with pytest.raises(ValueError, match="batch must be an integer"):
-                run_missing(stuck_at(-1, None), jobs, Keep(bank, batch=batch))
+                run_missing(stuck_at(-1, None), jobs, Compute(bank=bank, batch=batch))

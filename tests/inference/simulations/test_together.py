@@ -8,7 +8,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
-from bolfi_liquids.inference.simulations import Job, Keep, run_missing
+from bolfi_liquids.inference.simulations import Compute, Job, run_missing
 from bolfi_liquids.inference.simulations.job import run_batch
 
 
@@ -29,7 +29,7 @@ class Marching:
 def run(simulator, count, pool):
     jobs = [Job({"a": 1.0}, seed) for seed in range(count)]
     with SimulationBank() as bank:
-        found = run_missing(simulator.simulate, jobs, Keep(bank, executor=pool), (2,))
+        found = run_missing(simulator.simulate, jobs, Compute(bank=bank, executor=pool), (2,))
         assert len(bank) == count
     return found
 
@@ -46,7 +46,7 @@ def test_a_run_that_fails_costs_only_itself():
     with ThreadPoolExecutor(2) as pool:
         found = run(Marching(fails=2), 8, pool)
     assert [one.signal is None for one in found] == [seed == 2 for seed in range(8)]
-    assert "went wrong" in found[2].error
+    assert "went wrong" in found[2].error.text
     assert [one.signal[1] for one in found if one.signal is not None] == [1.0] * 3 + [4.0] * 4
 
 
@@ -78,11 +78,12 @@ def test_a_call_may_take_as_many_times_as_long_as_it_makes_simulations():
     sleepy.together = 4
     jobs = [Job({"a": 1.0}, seed) for seed in range(4)]
     with SimulationBank() as bank, ThreadPoolExecutor(1) as pool:
-        kept = Keep(bank, executor=pool, timeout=0.6)
+        kept = Compute(bank=bank, executor=pool, timeout=0.6)
         assert all(one.error is None for one in run_missing(sleepy, jobs, kept, (1,)))
         assert calls == [4]
-        kept = Keep(bank, "short", executor=pool, timeout=0.05)
-        assert all("no signal after" in one.error for one in run_missing(sleepy, jobs, kept, (1,)))
+        kept = Compute(bank=bank, executor=pool, timeout=0.05)
+        late = run_missing(sleepy, jobs, kept, (1,), identity="short")
+        assert all("no signal after" in one.error.text for one in late)
         assert calls == [4, 4, 1, 1, 1, 1]
 
 
@@ -121,7 +122,7 @@ def test_a_worker_that_is_killed_loses_its_call_and_what_was_stored_is_not_repea
             SimulationBank(tmp_path / "bank.sqlite") as bank,
             ProcessPoolExecutor(1, mp_context=spawn) as pool,
         ):
-            return run_missing(simulate, jobs, Keep(bank, executor=pool), (1,))
+            return run_missing(simulate, jobs, Compute(bank=bank, executor=pool), (1,))
 
     with pytest.raises(RuntimeError, match="lost its workers"):
         run_all()

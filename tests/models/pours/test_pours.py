@@ -172,7 +172,7 @@ def test_a_source_empties_while_it_is_held_and_keeps_what_landings_say(cups):
     """But for what hangs at the lip or falls beside it at the end, which has not yet left."""
     held = np.linspace(0.0, 2.0, 21)
     rate, long = np.radians(90.0), changed(cups, pour={"hold": 2.0})
-    left = models.draining(GLYCERIN, rate, long, [0, 1], held)
+    left = models.draining(models.PourBatch(GLYCERIN, rate, long, [0, 1]), held)
     assert (np.diff(left, axis=1) <= 0.0).all() and (left[:, 0] > left[:, -1] + 0.1).all()
     kept = models.landings(GLYCERIN, rate, long, [0, 1]).retained
     assert (left[:, -1] >= kept).all()

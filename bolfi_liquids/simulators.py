@@ -1,0 +1,237 @@
+"""The two simulators of the fluid that every stage uses: stirs and pours."""
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError
+from .inputs.prior import split_parameters
+from .inputs.recording import Recording
+
+if TYPE_CHECKING:
+    from .inference.types import Discrepancy
+    from .models import Cups, PourBatch, StirFrames, StirSetup
+
+RATE = "angular_velocity"
+"""Of the source [rad/s], among the parameters of a pour."""
+
+SAME_DENSITY = 0.02
+"""Relative difference up to which two weighings are of one liquid."""
+
+
+class FluidSimulator:
+    """Stops itself when its time is over, and is fastest with several simulations in a call.
+
+    Attributes:
+        together: Simulations that one thread makes at the same time.
+    """
+
+    together: ClassVar[int] = 4
+
+    def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
+        """Signals (B, ...) at theta, name -> (B,)."""
+        raise NotImplementedError
+
+    @property
+    def identity(self) -> str:
+        """A text that two equal simulators share, and no others."""
+        raise NotImplementedError
+
+    def time_limit(self, seconds: float) -> AbstractContextManager[None]:
+        """Inside, a simulation that takes longer raises TimeoutError."""
+        from .models import time_limit
+
+        return time_limit(seconds)
+
+    @property
+    def neutral(self) -> Mapping[str, float]:
+        """Coefficients that change nothing: runs with other effects share a call."""
+        from .models import EFFECTS
+
+        return {name: effect.neutral for name, effect in EFFECTS.items()}
+
+
+@dataclass(frozen=True)
+class StirSimulator(FluidSimulator):
+    """One or several recordings of one liquid; their signals are joined along time.
+
+    Attributes:
+        recordings: At least one.
+        setups: The simulator's geometry and discretisation for each.
+    """
+
+    recordings: tuple[Recording, ...]
+    setups: tuple["StirSetup", ...]
+
+    def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
+        """Inclinations (B, T of all recordings, 2) [rad] for parameters of shape (B,).
+
+        Besides the liquid's parameters, theta may hold coefficients of `models.EFFECTS`.
+        """
+        from . import models
+
+        liquid, effects = split_parameters(theta)
+        signals = [
+            models.stir(
+                models.Liquid(**liquid, density=recording.number("liquid_density")),
+                recording.gripper,
+                setup,
+                seeds,
+                effects,
+            )
+            for recording, setup in zip(self.recordings, self.setups, strict=True)
+        ]
+        return np.concatenate(signals, axis=1)
+
+    def frames(self, theta: Mapping[str, float], seed: int, rate: float) -> "StirFrames":
+        """What one stir looks like, `rate` times a second; of one recording alone."""
+        from . import models
+
+        (recording,), (setup,) = self.recordings, self.setups
+        liquid, effects = split_parameters(theta)
+        named = models.Liquid(**liquid, density=recording.number("liquid_density"))
+        return models.stir_frames(named, recording.gripper, setup, seed, rate=rate, effects=effects)
+
+    @property
+    def least_viscosity(self) -> float:
+        """Viscosity [Pa s] below which no recording distinguishes liquids."""
+        return min(
+            setup.least_viscosity(recording.number("liquid_density"))
+            for recording, setup in zip(self.recordings, self.setups, strict=True)
+        )
+
+    @property
+    def observed(self) -> NDArray[np.float64]:
+        """Recorded inclinations (T of all recordings, 2) [rad], NaN where missing."""
+        return np.concatenate([recording.inclination for recording in self.recordings])
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Times of the joined samples [s]; each recording has its own zero."""
+        return np.concatenate([recording.time for recording in self.recordings])
+
+    @property
+    def member(self) -> NDArray[np.int64]:
+        """Which recording each of the joined samples belongs to."""
+        return np.repeat(np.arange(len(self.recordings)), [len(r.time) for r in self.recordings])
+
+    def discrepancy(self) -> "Discrepancy":
+        """The paper's integral over each recording, summed over the recordings."""
+        from .inference import squared_difference
+
+        parts = [squared_difference(recording.time) for recording in self.recordings]
+        ends = np.cumsum([len(recording.time) for recording in self.recordings])[:-1]
+
+        def summed(observed: NDArray, simulated: NDArray) -> float:
+            pairs = zip(parts, np.split(observed, ends), np.split(simulated, ends), strict=True)
+            return float(sum(part(seen, shown) for part, seen, shown in pairs))
+
+        return summed
+
+    @cached_property
+    def settings(self) -> dict[str, Any]:
+        """Everything that fixes the simulators, by recording."""
+        return {
+            f"recording_{at}": setup.settings() for at, setup in enumerate(self.setups, start=1)
+        }
+
+    @property
+    def identity(self) -> str:
+        """Of settings, density and gripper paths."""
+        paths = hashlib.sha256()
+        for recording in self.recordings:
+            paths.update(recording.gripper.time.tobytes())
+            paths.update(recording.gripper.position.tobytes())
+        densities = [recording.number("liquid_density") for recording in self.recordings]
+        return json.dumps([self.settings, densities, paths.hexdigest()], sort_keys=True)
+
+
+def same_liquid(one: Recording, other: Recording) -> bool:
+    """Whether two recordings may be of one liquid, by its weighed density."""
+    density = other.number("liquid_density")
+    return abs(one.number("liquid_density") - density) <= SAME_DENSITY * density
+
+
+def stir_simulator(recordings: list[Recording], particles: int) -> StirSimulator:
+    """Set up the simulators of recordings of one liquid.
+
+    Raises:
+        InputError: The recordings' liquids differ in density.
+    """
+    from .models import StirSetup
+
+    first, *others = recordings
+    for other in others:
+        if not same_liquid(other, first):
+            raise InputError(
+                f"{other.attrs['liquid_density']} kg/m3, but {first.path} has "
+                f"{first.number('liquid_density')} kg/m3",
+                where=f"{other.path}: attribute liquid_density",
+                fix="calibrate each liquid in a run of its own",
+            )
+    setups = tuple(StirSetup.from_recording(r, particles=particles) for r in recordings)
+    return StirSimulator(tuple(recordings), setups)
+
+
+Batched = Callable[[Mapping[str, Any], Any], "PourBatch"]
+"""(theta, seeds) -> the pours to be made; theta holds liquid, coefficients and `RATE`."""
+
+
+class PourOutcome(Protocol):
+    """Which pours are made of each theta, and what is kept of them; two equal ones compare so."""
+
+    def __call__(
+        self, batch: Batched, theta: Mapping[str, NDArray], seeds: NDArray
+    ) -> NDArray[np.float64]:
+        """Shape (B, ...) for theta, name -> (B,)."""
+        ...
+
+    @property
+    def settings(self) -> list[Any]:
+        """What fixes it, as JSON; its name comes first."""
+        ...
+
+
+@dataclass(frozen=True)
+class PourSimulator(FluidSimulator):
+    """Pours of liquids.
+
+    Attributes:
+        cups: Source and receiver, and how the source is turned.
+        density: Of the liquids [kg/m3].
+        outcome: Which pours are made, and what is kept of them.
+        effects: Names of those whose coefficients are parameters.
+        particles: Number of particles of each liquid; 0: cells follow the cup.
+    """
+
+    cups: "Cups"
+    density: float
+    outcome: PourOutcome
+    effects: tuple[str, ...] = ()
+    particles: int = 0
+
+    def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
+        """Outcomes (B, ...) at theta, name -> (B,)."""
+        return self.outcome(self.batch, theta, seeds)
+
+    def batch(self, theta: Mapping[str, Any], seeds: Any) -> "PourBatch":
+        """Pours at theta: liquid, coefficients of `models.EFFECTS`, and `RATE`."""
+        from . import models
+
+        liquid, effects = split_parameters({k: v for k, v in theta.items() if k != RATE})
+        named = models.Liquid(**liquid, density=self.density)
+        return models.PourBatch(named, theta[RATE], self.cups, seeds, self.particles, effects)
+
+    @property
+    def identity(self) -> str:
+        """Of outcome, cups, density and effects."""
+        name, *fixed = self.outcome.settings
+        made_of = [self.cups.settings(self.particles), self.density, list(self.effects), *fixed]
+        return json.dumps([name, *made_of], sort_keys=True)

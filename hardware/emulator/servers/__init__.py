@@ -1,1 +1,0 @@
-"""The emulator's four ports: RTDE, script upload, dashboard and admin, one session a client."""

@@ -1,0 +1,74 @@
+"""A camera calibrated by the command, from pictures of a lens and a roll that are known."""
+
+import dataclasses
+import json
+import re
+
+import numpy as np
+import pytest
+from bolfi_liquids.hardware.recorder.views import camera_model
+from bolfi_liquids.hardware.rendering.boards import render_board, render_plumb_line
+from bolfi_liquids.hardware.rig_file import bundled_rig
+from bolfi_liquids.hardware.vision import CharucoBoard
+from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
+
+from bolfi_liquids.cli.app import app
+
+cv2 = pytest.importorskip("cv2")
+
+ROLL_DEG = 1.5
+FOCAL = (780.0, 776.0)
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory):
+    """A directory of boards, and a plumb line, as the rig's camera xz with another lens sees."""
+    folder, rng, board = (
+        tmp_path_factory.mktemp("pictures"),
+        np.random.default_rng(1),
+        CharucoBoard(),
+    )
+    rolled = bundled_rig().camera("xz").model_copy(update={"roll_deg": ROLL_DEG})
+    camera = dataclasses.replace(camera_model(rolled), focal=FOCAL)
+    middle = 0.5 * board.square * np.array([board.columns, board.rows, 0.0])
+    (folder / "boards").mkdir()
+    for k in range(12):
+        turn = rng.uniform([-0.5, -0.5, -0.2], [0.5, 0.5, 0.2])
+        place = rng.uniform([-0.08, -0.06, 0.33], [0.08, 0.06, 0.47])
+        turned = Rotation.from_rotvec(turn).as_matrix()
+        image = render_board(board, camera, turned, place - turned @ middle, rng)
+        cv2.imwrite(str(folder / "boards" / f"{k}.png"), image)
+    thread = render_plumb_line(camera, np.array([0.02, 0.02, 0.4]), 0.5, 0.001, rng)
+    cv2.imwrite(str(folder / "plumb.png"), thread)
+    return folder
+
+
+def test_the_lens_is_written_and_the_roll_told(pictures, tmp_path):
+    lens = tmp_path / "lens.json"
+    command = ["rig", "calibrate-cameras", "--boards", str(pictures / "boards"), "--out", str(lens)]
+    done = CliRunner().invoke(app, [*command, "--plumb-line", str(pictures / "plumb.png")])
+    assert done.exit_code == 0, done.stderr
+    np.testing.assert_allclose(json.loads(lens.read_text())["focal"], FOCAL, rtol=5e-3)
+    told = re.search(r"roll_deg = (\S+)", done.stdout)
+    assert told is not None and float(told[1]) == pytest.approx(ROLL_DEG, abs=0.1)
+    assert f'intrinsics = "{lens.name}"' in done.stdout
+
+
+def test_a_plumb_line_alone_keeps_the_lens(pictures, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    command = ["rig", "calibrate-cameras", "--plumb-line", str(pictures / "plumb.png")]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0 and "roll_deg = " in done.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "options",
+    [["--view", "xy"], ["--square", "0.1"], ["--boards", "nowhere"], ["--plumb-line", "x"]],
+)
+def test_what_cannot_be_used_is_named(options, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["rig", "calibrate-cameras", *options])
+    assert done.exit_code != 0
+    assert options[0] in done.stderr or options[1] in done.stderr
