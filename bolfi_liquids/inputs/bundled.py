@@ -24,4 +24,4 @@ def bundled_pours(liquid: str) -> "PourTable":
     from .pour_table import open_pours
 
     with as_file(files("bolfi_liquids.data") / "pours.csv") as path:
-        return open_pours(path, liquid, told=False)
+        return open_pours(path, liquid)

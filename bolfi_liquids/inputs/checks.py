@@ -97,7 +97,7 @@ def check_values(recording: Recording) -> None:
         value = recording.attrs[name]
         size = value if isinstance(value, int | float) and not isinstance(value, bool) else np.nan
         if not 0.0 < size or not least <= size <= most:
-            given = f"{size:g} {unit}" if size == value else " ".join(repr(value).split())
+            given = " ".join(repr(value).split()) if np.isnan(size) else f"{size:g} {unit}"
             raise InputError(
                 f"{given:.80}, {_span(least, most)} {unit} allowed",
                 where=f"{recording.path}: attribute {name}",
@@ -208,7 +208,7 @@ def _torn(recording: Recording, field: str) -> Measured:
     torn = np.any([torn_values(recording.values(name), JUMPS[name]) for name in JUMPS], axis=0)
     first = int(torn.argmax())
     return int(torn.sum()), (
-        f" of {len(torn)}, the first is sample {first} at {recording.time[first]:.10g} s"
+        f" of {len(torn)}, the first is sample {first} at {recording.time[first]:.13g} s"
     )
 
 

@@ -50,7 +50,6 @@ class PourTable:
         fractions: Spilled, received and retained, shape (A, 3); rows sum to 1.
         lines: Of the file, shape (A,).
         hash: SHA-256 of the file's bytes, in hexadecimal.
-        unused: Columns of the file that nobody reads.
     """
 
     path: Path
@@ -60,7 +59,6 @@ class PourTable:
     fractions: NDArray[np.float64]
     lines: NDArray[np.int64]
     hash: str
-    unused: tuple[str, ...] = ()
 
     @property
     def observed(self) -> NDArray[np.float64]:
@@ -87,14 +85,13 @@ Pours = PourTable | str | Path
 """A table of pours, or its path."""
 
 
-def open_pours(path: str | Path, liquid: str | None = None, *, told: bool = True) -> PourTable:
+def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:
     """Read a table of pours, in the form that `bolfi-liquids guide criticism` shows.
 
     Args:
         path: The file: columns `angular_velocity_deg_s`, `distance_cm`, and `spilled`,
             `received`, `retained` in any one unit; `liquid` if there are several.
         liquid: Whose pours to take; needed where the file holds more than one liquid's.
-        told: Whether to say which columns are not used.
 
     Raises:
         InputError: The file is missing or cannot be used; the message names file, line, column
@@ -118,8 +115,7 @@ def open_pours(path: str | Path, liquid: str | None = None, *, told: bool = True
     amounts = np.stack([values[name] for name in AMOUNTS], axis=1)
     total = amounts.sum(axis=1, keepdims=True)
     _check_totals(table, total[:, 0])
-    unused = table.others((*RANGES, LIQUID))
-    if unused and told:
+    if unused := table.others((*RANGES, LIQUID)):
         logger.warning("%s: columns not used: %s", table.path, ", ".join(unused))
     return PourTable(
         path=table.path,
@@ -129,7 +125,6 @@ def open_pours(path: str | Path, liquid: str | None = None, *, told: bool = True
         fractions=amounts / total,
         lines=np.asarray(table.lines),
         hash=hashlib.sha256(table.path.read_bytes()).hexdigest(),
-        unused=unused,
     )
 
 
@@ -260,7 +255,7 @@ def _within(table: Table, name: str, least: float, most: float) -> NDArray[np.fl
         raise InputError(
             f"{table.column(name)[at]!r} is not between {least:g} and {most:g}",
             where=table.where(table.lines[at], name),
-            fix="correct or remove the line",
+            fix="correct or remove the line; what a scale shows below 0 is 0",
         )
     return values
 

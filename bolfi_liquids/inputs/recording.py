@@ -210,7 +210,7 @@ def _without_torn(values: dict[str, NDArray]) -> tuple[str, ...]:
         for sample in np.flatnonzero(at):
             told.append(
                 f"{name}: {values[name][sample]:.6g} {unit} of sample {sample} "
-                f"({values['time'][sample]:.10g} s) jumps out and back, and counts as missing"
+                f"({values['time'][sample]:.13g} s) jumps out and back, and counts as missing"
             )
         values[name] = np.where(at, np.nan, values[name])
     return tuple(told)

@@ -361,11 +361,11 @@ def at_camera_times(values: dict[str, NDArray]) -> tuple[dict[str, NDArray], str
 
 def outline(recording: Recording) -> str:
     """What was read, in a few lines that show a wrong unit or sign at a glance."""
-    time, path = recording.time, recording.gripper.position
+    path = recording.gripper.position
     reach, fastest = np.nanmax(path, axis=0) - np.nanmin(path, axis=0), np.nanmax(speed(recording))
     lines = [
-        f"{recording.path}: {len(time)} samples over {time[-1] - time[0]:.2f} s, "
-        f"{1.0 / np.median(np.diff(time)):.1f} Hz",
+        f"{recording.path}: {1.0 / np.median(np.diff(recording.time)):.1f} Hz",
+        *(f"{subject}: {told}" for subject, told in recording.subjects().items()),
         f"gripper: {100 * reach[0]:.1f} x {100 * reach[1]:.1f} cm, "
         f"{100 * np.nanmean(path[:, 2]):.1f} cm above the cup's floor, "
         f"up to {100 * fastest:.1f} cm/s",
@@ -375,7 +375,6 @@ def outline(recording: Recording) -> str:
         f"seen in {np.isfinite(angle).mean():.1%} of the samples"
         for name, angle in zip(PLANES, np.degrees(recording.inclination.T), strict=True)
     ]
-    lines += [f"{subject}: {told}" for subject, told in recording.subjects().items()]
     return "\n".join([*lines, *(f"warning: {one}" for one in _warnings(recording))])
 
 

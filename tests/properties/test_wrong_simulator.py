@@ -76,6 +76,6 @@ def p_value(table, hold):
 @pytest.mark.slow
 def test_pours_of_a_wrong_simulator_differ_by_more_than_this_one_errs():
     """Those of the reference do not: the same test does not reject whatever it is given."""
-    wrong = open_pours(WRONG / "pours.csv", "glycerin", told=False)
+    wrong = open_pours(WRONG / "pours.csv", "glycerin")
     assert p_value(wrong, bundled_cups().pour.hold) < LEVEL
     assert p_value(bundled_pours("glycerin"), HOLD) > LEVEL

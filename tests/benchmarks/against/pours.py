@@ -137,7 +137,7 @@ def _poured_liquid(folder: Path, truth: PourTruth, cups: Cups) -> PouredLiquid:
 
 def _pours(path: Path, liquid: str, cups: Cups) -> tuple[ReferencePour, ...]:
     """The pours of one liquid in a table, with their landings where these are known."""
-    table = open_pours(path, liquid, told=False)
+    table = open_pours(path, liquid)
     check_scene(table, cups)
     landed = open_landings(path)
     pours = []
