@@ -208,6 +208,7 @@ class Bolfi:
         covered = self.succeeded + len(self._state.pending)
         return min(n, max(0, self.initial - covered))
 
+    @in_float64
     def _acquired(self, n: int, designed: np.ndarray) -> np.ndarray:
         """theta [n, d] of the engine's choice, `designed` [m, d] being asked with them."""
         history = self._state.history
@@ -221,7 +222,7 @@ class Bolfi:
             key = jax.random.wrap_key_data(jax.device_put(words), impl="threefry2x32")
             fantasized = self._learned.fantasize(self.prior.to_unit(self.prior.to_dict(pending)))
             shape = n - len(parts), len(self.prior)
-            u = chosen(in_float64(self._acquire)(key, fantasized, shape[0]), shape)
+            u = chosen(self._acquire(key, fantasized, shape[0]), shape)
             parts.append(self.prior.to_array(self.prior.from_unit(u)))
         return np.concatenate(parts)
 
@@ -370,7 +371,7 @@ class Bolfi:
             )
         started = time.perf_counter()
         known, history = self._training_data(), self._state.history
-        fitted = self._learner.finish(known)
+        fitted = in_float64(self._learner.finish)(known)
         self._seconds += time.perf_counter() - started
         made = Fit(
             prior=self.prior,

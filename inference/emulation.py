@@ -29,6 +29,7 @@ class Emulation:
         self.left_out = vectors.left_out(learned)
         self.missed = learned.outputs - self.left_out
 
+    @in_float64
     def predict(self, theta: Theta) -> np.ndarray:
         """Mean output [n, m] at theta, name -> [n]; outside the support, at its edge."""
         return vectors.mean(self._learned, np.atleast_2d(self.prior.to_unit(theta)))

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
-from ..arguments import checked_points
 from .namespaces import namespace, ndtri
 
 TREND_SD = 3.0
@@ -193,15 +192,6 @@ def _predict(gp: GP, u: Any) -> tuple[Any, Any]:
 
 def _whitened(gp: GP, cross: Any) -> Any:
     return cross @ gp.whitener.mT
-
-
-def predict_points(gp: GP, u: Any) -> tuple[np.ndarray, np.ndarray]:
-    """`predict` of a user's points.
-
-    Raises:
-        ValueError: u is of another shape.
-    """
-    return predict(gp, checked_points(u, gp.data.u.shape[1]))
 
 
 def predict_joint(gp: GP, u: np.ndarray, v: np.ndarray) -> np.ndarray:

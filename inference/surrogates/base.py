@@ -5,6 +5,7 @@ from typing import Any, NamedTuple, Protocol
 import jax
 import numpy as np
 
+from .._float64 import in_float64
 from ..gp.process import GP
 from ..prior import Prior
 from ..types import LogLikelihood, LogSecondMoment, Theta
@@ -143,6 +144,7 @@ class SurrogateView:
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.prior}, {type(self.learned).__name__})"
 
+    @in_float64
     def predict(self, theta: Theta) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new simulation at theta, each [..., *its own axes].
 
@@ -154,6 +156,7 @@ class SurrogateView:
         return _shaped(mean, u.shape[:-1]), _shaped(sd, u.shape[:-1])
 
     @property
+    @in_float64
     def warnings(self) -> list[str]:
         """What the surrogate's own checks complain of, in sentences."""
         return self.learned.warnings()

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._float64 import in_float64
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.optimise import minimise_in_box
 from ..gp.process import (
@@ -15,9 +14,7 @@ from ..gp.process import (
     fantasize,
     leave_one_out,
     predict,
-    predict_points,
 )
-from ..types import LogLikelihood, LogSecondMoment
 from .outliers import is_outlier
 from .threshold import (
     Matched,
@@ -86,6 +83,9 @@ class DiscrepancySurrogate:
     resolution: float = np.inf
     said: tuple[str, ...] = ()
 
+    log_likelihood = staticmethod(log_likelihood)
+    log_second_moment = staticmethod(log_second_moment)
+
     @property
     def equal(self) -> bool:
         """Whether all discrepancies are the same, but for rounding."""
@@ -96,7 +96,6 @@ class DiscrepancySurrogate:
         return self.scale.transform
 
     @property
-    @in_float64
     def state(self) -> ThresholdState:
         threshold = (self.threshold - self.scale.location) / self.scale.spread
         width, resolution = (
@@ -105,7 +104,6 @@ class DiscrepancySurrogate:
         return ThresholdState(self.gp, np.asarray(threshold), width, resolution, self.success)
 
     @property
-    @in_float64
     def cautious(self) -> "DiscrepancySurrogate":
         """The surrogate to which doubt beyond what the threshold can resolve is no agreement."""
         mean, _ = self.predict(self.gp.data.u)
@@ -117,18 +115,9 @@ class DiscrepancySurrogate:
     def sure(self) -> ThresholdState:
         return self.state._replace(doubt=np.zeros(()))
 
-    @property
-    def log_likelihood(self) -> LogLikelihood:
-        return log_likelihood
-
-    @property
-    def log_second_moment(self) -> LogSecondMoment:
-        return log_second_moment
-
-    @in_float64
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new g(Delta), its noise included, at quantiles u [n, d]: [n], [n]."""
-        (mean,), (variance,) = predict_points(self.gp, u)
+        (mean,), (variance,) = predict(self.gp, u)
         sd = np.sqrt(variance + np.exp(2.0 * self.gp.hyper.log_noise[0]))
         return self.scale.location + self.scale.spread * mean, self.scale.spread * sd
 
@@ -136,7 +125,6 @@ class DiscrepancySurrogate:
         """g(Delta) [n], capped at the worst run that was learned from."""
         return self.transform(np.minimum(discrepancy, self.discrepancy.max()))
 
-    @in_float64
     def minimum(self) -> np.ndarray:
         """Where the mean is surely low: minimiser of mean + sd over the box, u [d].
 
@@ -149,7 +137,6 @@ class DiscrepancySurrogate:
 
         return minimise_in_box(surely, self.gp.data.u.shape[1])
 
-    @in_float64
     def fantasize(self, u: np.ndarray) -> "DiscrepancySurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
         return replace(self, gp=fantasize(self.gp, u)) if len(u) else self
@@ -162,7 +149,6 @@ class DiscrepancySurrogate:
         """The threshold, on the scale of the discrepancy."""
         return [f"threshold {float(self.transform.inverse(np.asarray(self.threshold))):.3g}"]
 
-    @in_float64
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, 1]."""
         mean, variance = leave_one_out(self.gp)
@@ -176,7 +162,6 @@ class DiscrepancySurrogate:
         low = LOW * np.hypot(sd, self.width)
         return self.equal or bool((self.threshold > mean - low).any())
 
-    @in_float64
     def warnings(self, *, confirmed: bool = False) -> list[str]:
         """What the process's errors complain of, unless it is confirmed, and what was compared."""
         if self.equal:
@@ -188,7 +173,6 @@ class DiscrepancySurrogate:
             said.append(NOISY)
         return said if self.fits else [*said, LOW_THRESHOLD]
 
-    @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
         """One new discrepancy for each row of u [n, d]."""
         mean, sd = self.predict(u)
@@ -196,7 +180,6 @@ class DiscrepancySurrogate:
         return {"discrepancy": self.transform.inverse(drawn)}
 
 
-@in_float64
 def learn(
     u: np.ndarray,
     discrepancy: np.ndarray,
@@ -252,7 +235,6 @@ def _fit(data: Data) -> GP:
     return condition(maximum_a_posteriori(data), data)
 
 
-@in_float64
 def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> DiscrepancySurrogate:
     """The surrogate with the threshold that a rule chooses, see `threshold.choose_threshold`.
 

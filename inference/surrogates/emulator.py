@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._float64 import in_float64
 from .._lazy import stats
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.process import (
@@ -15,7 +14,7 @@ from ..gp.process import (
     condition,
     leave_one_out,
 )
-from ..gp.process import predict_points as predict_scores
+from ..gp.process import predict as predict_scores
 from .component_noise import absorbed_noise, left_over
 from .components import Basis, principal_components
 from .measurement_noise import MIN_SIZE, Remainder, shrunk_covariance
@@ -86,7 +85,6 @@ class Emulator(NamedTuple):
         return (differ > EQUAL_RUNS_TOLERANCE * self.outputs.std(0)).any(1)
 
 
-@in_float64
 def emulate(
     u: np.ndarray,
     outputs: np.ndarray,
@@ -155,7 +153,6 @@ def _with_noise(emulator: Emulator, gp: GP, remainder: Remainder) -> Emulator:
     return emulator._replace(gp=gp, remainder=remainder, noise=noise)
 
 
-@in_float64
 def resized(emulator: Emulator, scale: Callable[[np.ndarray], np.ndarray]) -> Emulator:
     """The same with run-to-run noise whose size depends on the parameters, if errors show that.
 
@@ -308,13 +305,11 @@ def smallest_misfit(emulator: Emulator, observed: np.ndarray, u: np.ndarray) -> 
     return float(max(np.sqrt(total / len(observed)), MIN_SIZE))
 
 
-@in_float64
 def mean(emulator: Emulator, u: np.ndarray) -> np.ndarray:
     """Mean of the outputs at u [n, d]: [n, m]."""
     return _outputs(emulator.basis, predict_scores(emulator.gp, u)[0])
 
 
-@in_float64
 def left_out(emulator: Emulator) -> np.ndarray:
     """What all other runs predict of each run, components and hyperparameters kept: [n, m]."""
     return _outputs(emulator.basis, leave_one_out(emulator.gp)[0])

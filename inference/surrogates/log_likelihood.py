@@ -7,7 +7,6 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from .._float64 import in_float64
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.namespaces import namespace
 from ..gp.optimise import minimise_in_box
@@ -20,12 +19,10 @@ from ..gp.process import (
     padded,
     padded_rows,
     predict,
-    predict_points,
 )
 from ..sampling.importance import explore
 from ..sampling.target import Target
 from ..simulations.failures import impossible, incomparable, not_finite
-from ..types import LogLikelihood, LogSecondMoment
 from .base import Measured, TrainingData
 from .success import learn_success, log_success, padded_success
 from .warnings import EQUAL, UNCERTAIN, complaints
@@ -152,6 +149,9 @@ class LogLikelihoodSurrogate:
     values: np.ndarray
     learned_at: int
 
+    log_likelihood = staticmethod(log_likelihood)
+    log_second_moment = staticmethod(log_second_moment)
+
     @property
     def gp(self) -> GP:
         return self.state.gp
@@ -175,15 +175,6 @@ class LogLikelihoodSurrogate:
     def sure(self) -> LevelState:
         return self.state._replace(doubt=np.zeros(()))
 
-    @property
-    def log_likelihood(self) -> LogLikelihood:
-        return log_likelihood
-
-    @property
-    def log_second_moment(self) -> LogSecondMoment:
-        return log_second_moment
-
-    @in_float64
     def minimum(self) -> np.ndarray:
         """Where the log likelihood is surely high: greatest mean less sd, u [d]."""
 
@@ -193,7 +184,6 @@ class LogLikelihoodSurrogate:
 
         return minimise_in_box(surely, self.gp.data.u.shape[1])
 
-    @in_float64
     def fantasize(self, u: np.ndarray) -> "LogLikelihoodSurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
         if not len(u):
@@ -202,10 +192,9 @@ class LogLikelihoodSurrogate:
         usual = None if noise is None else np.full(len(u), np.median(noise))
         return replace(self, state=self.state._replace(gp=fantasize(self.gp, u, usual)))
 
-    @in_float64
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new log likelihood, its noise included, at u [n, d]: [n], [n]."""
-        mean, variance = predict_points(self.gp, u)
+        mean, variance = predict(self.gp, u)
         sd = np.sqrt(variance[0] + np.exp(2.0 * self.gp.hyper.log_noise[0]))
         scale, values = self.state.scale, self.state.scale.values(mean[0])
         return values, scale.spread * scale.folds(values) * sd
@@ -223,7 +212,6 @@ class LogLikelihoodSurrogate:
         """The noise of a log likelihood near the best one."""
         return [f"noise {float(self.constants()['noise']):.2g} nats"]
 
-    @in_float64
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, 1] of the compressed depths."""
         mean, variance = leave_one_out(self.gp)
@@ -235,7 +223,6 @@ class LogLikelihoodSurrogate:
         """Always: no data are compared here."""
         return True
 
-    @in_float64
     def warnings(self, *, confirmed: bool = False) -> list[str]:
         """What the leave-one-out errors complain of, of depths that count, unless confirmed; and
         that much of what may be the posterior lies where the log likelihood is hardly known."""
@@ -256,14 +243,12 @@ class LogLikelihoodSurrogate:
         extrapolated = scale.values(mean) > scale.top + MAX_RISE
         return float(population.weights @ (unknown | extrapolated))
 
-    @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
         """One new log likelihood for each row of u [n, d]."""
         mean, sd = self.predict(u)
         return {"log_likelihood": mean + sd * rng.normal(size=mean.shape)}
 
 
-@in_float64
 def learn(
     u: np.ndarray,
     values: np.ndarray,

@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._float64 import in_float64
 from ..gp.hyperparameters import LENGTH
 from ..gp.namespaces import log_ndtr, namespace
 from ..gp.process import (
@@ -41,7 +40,6 @@ class _Laplace(NamedTuple):
     variances: np.ndarray  # [p] of their noise
 
 
-@in_float64
 def learn_success(runs: RunOutcomes, normal: np.ndarray | None) -> GP | None:
     """A process whose normal integral is the probability of success; None if no run failed.
 
