@@ -120,10 +120,9 @@ class Coverage:
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Coverage minus its nominal level, with exact 99 % intervals at the levels."""
-        from .plots import Rates, plot_coverage
+        from .plots import plot_coverage
 
-        rates = Rates(self.levels, self.rate, self.low, self.high)
-        return plot_coverage(self.names, self.quantiles, rates, ax)
+        return plot_coverage(self, ax)
 
 
 def coverage(

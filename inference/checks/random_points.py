@@ -99,10 +99,9 @@ class Tarp:
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Expected coverage against credibility, with its bootstrap band and the diagonal."""
-        from .plots import Curve, plot_tarp
+        from .plots import plot_tarp
 
-        curve = Curve(self.credibility, self.expected_coverage, self.low, self.high)
-        return plot_tarp(curve, len(self.replicates), self.replicates.most, ax)
+        return plot_tarp(self, ax)
 
 
 def tarp(

@@ -90,13 +90,13 @@ class SBC:
         """
         from .plots import plot_ecdf_difference
 
-        return plot_ecdf_difference(self.names, self.ranks, self.draws, ax, level)
+        return plot_ecdf_difference(self, ax, level)
 
     def histogram(self, axes: Any = None, level: float = 0.95) -> "list[Axes]":
         """Binned ranks, one axes per quantity; grey holds each bar with probability `level`."""
         from .plots import plot_histograms
 
-        return plot_histograms(self.names, self.ranks, self.draws, axes, level)
+        return plot_histograms(self, axes, level)
 
 
 def _shape(name: str, ranks: np.ndarray, draws: int) -> str:
