@@ -100,7 +100,7 @@ class Bolfi:
             "seed": self.seed,
             "initial": self.initial,
         }
-        self._state = init(len(prior), self.observed.shape, self._learner.features)
+        self._state = init(len(prior), self.observed.shape, self._learner.measure([]).features)
         self._learned: Any = None  # the family's surrogate, once there is one
         self._before: Before | None = None  # the posterior of which `confirm` drew
         self._seconds = 0.0

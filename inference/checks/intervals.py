@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 CONFIDENCE = 0.99  # of the intervals shown for each rate
 POWER = 0.8  # of the coverage that is said to be found
+DRAWN_LEVELS = 100  # at which the curve of a figure is drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,9 +121,28 @@ class Coverage:
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Coverage minus its nominal level, with exact 99 % intervals at the levels."""
-        from .plots import plot_coverage
+        from matplotlib.ticker import PercentFormatter
 
-        return plot_coverage(self, ax)
+        from .plots import LEGEND_BELOW, axes, band, closed, colour, finish
+
+        ax = axes(ax)
+        n, q = self.quantiles.shape
+        z = band(ax, n, DRAWN_LEVELS - 1)  # |2 u - 1| is uniform like u
+        level = closed(z, 1.0)
+        for j, name in enumerate(self.names):
+            within = np.sort(2 * np.abs(self.quantiles[:, j] - 0.5))
+            curve = np.searchsorted(within, level, side="right") / n - level
+            ax.plot(level, curve, color=colour(j), lw=1.2, alpha=0.6)
+            shifted = self.levels + 0.008 * (j - (q - 1) / 2)  # so that bars do not hide each other
+            error = np.stack([self.rate - self.low, self.high - self.rate])[:, :, j]
+            excess = self.rate[:, j] - self.levels
+            style = {"fmt": "o", "ms": 4.5, "capsize": 2.5, "lw": 1.2}
+            ax.errorbar(shifted, excess, error, color=colour(j), label=name, **style)
+        ax.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+        ax.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
+        ax.set_xlabel("nominal level of the central interval")
+        ax.set_ylabel("truths held − nominal")
+        return finish(ax, n, **LEGEND_BELOW)
 
 
 def coverage(

@@ -11,6 +11,7 @@ from numpyro.infer.hmc import HMCState, hmc
 from numpyro.infer.util import ParamInfo
 from scipy.special import ndtr, ndtri
 
+from ..gp.process import GP, padded
 from ..types import LogLikelihood
 from .compilation_cache import kept_compilations
 from .importance import explore
@@ -176,8 +177,7 @@ def _blocks(
 
     d = start.shape[1]
     seeds = rng.integers(2**31, size=len(start)).astype(np.uint32)
-    # padded, so that another number of simulations reuses the compiled program
-    state = target.state.padded() if hasattr(target.state, "padded") else target.state
+    state = padded_state(target.state)
     y = start @ whitener.T
 
     def block(starts: Sequence[np.ndarray | None]) -> Chains:
@@ -194,6 +194,17 @@ def _blocks(
     yield first
     while True:
         yield block([None] * len(start))
+
+
+def padded_state(state: Any) -> Any:
+    """The same likelihood in arrays of few shapes, so that another number of simulations reuses the
+    compiled program: its processes are padded, and what its own method `padded` pads."""
+
+    def process(part: object) -> bool:
+        return isinstance(part, GP)
+
+    state = state.padded() if hasattr(state, "padded") else state
+    return jax.tree.map(lambda one: padded(one) if process(one) else one, state, is_leaf=process)
 
 
 def _take(blocks: Iterator[Chains], count: int, left: list[Chains]) -> Chains:

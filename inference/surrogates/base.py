@@ -41,8 +41,7 @@ class Surrogate(Protocol):
     @property
     def state(self) -> Any:
         """NamedTuple of NumPy arrays on which the likelihood depends, `gp` among them; data, never
-        a closure. Its method `padded` gives the same likelihood in arrays of few shapes: NUTS is
-        compiled for each."""
+        a closure. NUTS is compiled for each set of shapes, see `nuts.padded_state`."""
         ...
 
     @property

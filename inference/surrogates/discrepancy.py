@@ -6,13 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
-from ..gp.optimise import minimise_in_box
+from ..gp.optimise import surely_least
 from ..gp.process import (
     GP,
     Data,
     condition,
     fantasize,
     leave_one_out,
+    leave_one_out_errors,
     predict,
 )
 from .outliers import is_outlier
@@ -126,16 +127,8 @@ class DiscrepancySurrogate:
         return self.transform(np.minimum(discrepancy, self.discrepancy.max()))
 
     def minimum(self) -> np.ndarray:
-        """Where the mean is surely low: minimiser of mean + sd over the box, u [d].
-
-        The mean alone may be least in a corner where nothing was simulated.
-        """
-
-        def surely(u: np.ndarray) -> np.ndarray:
-            (mean,), (variance,) = predict(self.gp, u)
-            return mean + np.sqrt(variance)
-
-        return minimise_in_box(surely, self.gp.data.u.shape[1])
+        """Where the discrepancy is surely low, u [d]."""
+        return surely_least(self.gp)
 
     def fantasize(self, u: np.ndarray) -> "DiscrepancySurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
@@ -151,9 +144,7 @@ class DiscrepancySurrogate:
 
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, 1]."""
-        mean, variance = leave_one_out(self.gp)
-        error = (self.gp.data.y - mean) / np.sqrt(variance)
-        return {"loo_z": error[0, : len(self.discrepancy), None]}
+        return {"loo_z": leave_one_out_errors(self.gp, len(self.discrepancy))}
 
     @property
     def fits(self) -> bool:

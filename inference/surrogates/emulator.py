@@ -13,6 +13,7 @@ from ..gp.process import (
     Hyper,
     condition,
     leave_one_out,
+    leave_one_out_errors,
 )
 from ..gp.process import predict as predict_scores
 from .component_noise import absorbed_noise, left_over
@@ -126,7 +127,9 @@ def _learned(
     share = max(EXPLAINED_SHARE, 1.0 - limits.left / varied) if varied else EXPLAINED_SHARE
     components = principal_components(outputs, units, limits.components, share, spread)
     data = known._replace(y=components.scores(outputs).T, spread=spread)
-    basis, hyper = _taught(components, data, limits.predicted)
+    basis, hyper = components, maximum_a_posteriori(data)
+    if limits.predicted is not None:
+        basis, hyper = _predicted(basis, hyper, data, limits.predicted)
     remainder = _left(basis, outputs, spread)
     excess = absorbed_noise(basis, np.exp(2.0 * hyper.log_noise), remainder, n)
     smaller = np.log1p(-excess)
@@ -186,12 +189,6 @@ def _log_sizes(emulator: Emulator) -> np.ndarray:
     residuals = basis.residuals(emulator.outputs)
     found = squared @ (gp.data.y - mean) ** 2 + np.sum(residuals**2, 1)
     return 0.5 * np.log(spread * (found / due + LEAST_OF_ERROR))
-
-
-def _taught(basis: Basis, data: Data, predicted: float | None) -> tuple[Basis, Hyper]:
-    """Components that the parameters predict, and the hyperparameters of their scores."""
-    hyper = maximum_a_posteriori(data)
-    return (basis, hyper) if predicted is None else _predicted(basis, hyper, data, predicted)
 
 
 def _predicted(basis: Basis, hyper: Hyper, data: Data, least: float) -> tuple[Basis, Hyper]:
@@ -257,8 +254,7 @@ def run_to_run(gp: GP, basis: Basis, white: float, n: int) -> np.ndarray:
 def loo_errors(emulator: Emulator) -> np.ndarray:
     """Studentised leave-one-out errors of the scores [n, used], of what was simulated."""
     gp = emulator.gp.only(slice(emulator.basis.used))
-    mean, variance = leave_one_out(gp)
-    return ((gp.data.y - mean) / np.sqrt(variance)).T[: len(emulator.outputs)]
+    return leave_one_out_errors(gp, len(emulator.outputs))
 
 
 def noise_share(emulator: Emulator) -> float:

@@ -15,7 +15,7 @@ from .base import Measured, Surrogate, TrainingData
 from .discrepancy import DiscrepancySurrogate, learn, with_threshold
 from .emulator import PREDICTED_SHARE, Emulator, EmulatorLimits, emulate, goes_on, resized
 from .given_noise import Covariance, NoiseModel, check_noise, given_noise
-from .log_likelihood import LogLikelihoodFamily, LogLikelihoodLearner
+from .log_likelihood import LogLikelihoodFamily
 from .noise.by_mean import ByMean, SdOfMean, law_of
 from .noise.scales import OutputScale, Plain, comparable
 from .output_vectors import Output, Summary, describe, infinities, summarise
@@ -72,10 +72,6 @@ class DiscrepancyLearner:
     family: DiscrepancyFamily
     distance: Discrepancy
     observed: np.ndarray
-
-    @property
-    def features(self) -> int:
-        return self.observed.size
 
     @property
     def any_shape(self) -> bool:
@@ -211,10 +207,6 @@ class SignalLearner:
     scale: OutputScale
 
     @property
-    def features(self) -> int:
-        return len(self.values)
-
-    @property
     def any_shape(self) -> bool:
         """Whether signals may have another shape than what was observed."""
         return self.family.summary is not None
@@ -291,7 +283,6 @@ class SignalLearner:
 
 
 Family = DiscrepancyFamily | SignalFamily | LogLikelihoodFamily
-Learner = DiscrepancyLearner | SignalLearner | LogLikelihoodLearner
 FAMILIES: dict[str, type[Family]] = {
     family.name: family for family in (DiscrepancyFamily, SignalFamily, LogLikelihoodFamily)
 }

@@ -9,22 +9,21 @@ from scipy.special import ndtr, ndtri
 
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.namespaces import namespace
-from ..gp.optimise import minimise_in_box
+from ..gp.optimise import surely_least
 from ..gp.process import (
     GP,
     Data,
     condition,
     fantasize,
     leave_one_out,
-    padded,
-    padded_rows,
+    leave_one_out_errors,
     predict,
 )
 from ..sampling.importance import explore
 from ..sampling.target import Target
 from ..simulations.failures import impossible, incomparable, not_finite
 from .base import Measured, TrainingData
-from .success import learn_success, log_success, padded_success
+from .success import learn_success, log_success
 from .warnings import EQUAL, UNCERTAIN, complaints
 
 NEAR = 40.0  # nats below the best, down to which a log likelihood must be right
@@ -88,13 +87,6 @@ class LevelState(NamedTuple):
     doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts against a place
     optimism: np.ndarray = np.zeros(())
     rise: np.ndarray = np.full((), MAX_RISE)  # nats above the best value that count at most
-
-    def padded(self) -> "LevelState":
-        """The same likelihood in arrays of few shapes."""
-        success = padded_success(self.success)
-        return self._replace(
-            gp=padded(self.gp, 1, padded_rows(len(self.gp.data.u))), success=success
-        )
 
 
 def log_likelihood(state: LevelState, u: Any) -> Any:
@@ -176,13 +168,8 @@ class LogLikelihoodSurrogate:
         return self.state._replace(doubt=np.zeros(()))
 
     def minimum(self) -> np.ndarray:
-        """Where the log likelihood is surely high: greatest mean less sd, u [d]."""
-
-        def surely(u: np.ndarray) -> np.ndarray:
-            mean, variance = predict(self.gp, u)
-            return mean[0] + np.sqrt(variance[0])
-
-        return minimise_in_box(surely, self.gp.data.u.shape[1])
+        """Where the log likelihood is surely high, u [d]."""
+        return surely_least(self.gp)
 
     def fantasize(self, u: np.ndarray) -> "LogLikelihoodSurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
@@ -214,9 +201,7 @@ class LogLikelihoodSurrogate:
 
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, 1] of the compressed depths."""
-        mean, variance = leave_one_out(self.gp)
-        error = (self.gp.data.y - mean) / np.sqrt(variance)
-        return {"loo_z": error[0, : len(self.values), None]}
+        return {"loo_z": leave_one_out_errors(self.gp, len(self.values))}
 
     @property
     def fits(self) -> bool:
@@ -331,20 +316,15 @@ class LogLikelihoodFamily:
     name: ClassVar[str] = "log_likelihood"
     acquisition: ClassVar[str] = "draws"
     replicates: ClassVar[bool] = False
-
-    def learner(self, observed: np.ndarray) -> "LogLikelihoodLearner":
-        return LogLikelihoodLearner()
-
-
-@dataclass(frozen=True)
-class LogLikelihoodLearner:
-    """Log likelihoods are learned from as they are; the discrepancy is minus one."""
-
-    features: ClassVar[int] = 1  # the sd of the noise, NaN where none is given
     any_shape: ClassVar[bool] = True
 
+    def learner(self, observed: np.ndarray) -> "LogLikelihoodFamily":
+        """Itself: log likelihoods are learned from as they are; the discrepancy is minus one."""
+        return self
+
     def measure(self, signals: Sequence[np.ndarray | None]) -> Measured:
-        """Sds [n, 1] and minus the log likelihoods of n signals, None where a run failed."""
+        """Sds of the noise [n, 1], NaN where none is given, and minus the log likelihoods of n
+        signals, None where a run failed."""
         found, errors = np.full((len(signals), 2), np.nan), [""] * len(signals)
         for i, signal in enumerate(signals):
             if signal is None or (signal.size and np.isnan(signal).all()):

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..gp.namespaces import log_sum_exp, namespace
-from ..gp.process import GP, padded, padded_rows, predict
+from ..gp.process import GP, padded, predict
 from .emulator import Emulator
 from .measurement_noise import Reduced
 from .noise.run_size import Size, log_size
-from .success import log_success, padded_success
+from .success import log_success
 
 SCORES_TOGETHER = 8  # by which the scores of padded states are counted
 WALL = 0.01  # of prior quantiles, beyond a box, over which the likelihood vanishes
@@ -41,19 +41,17 @@ class SignalState(NamedTuple):
     freedom: np.ndarray | None = None
 
     def padded(self) -> "SignalState":
-        """The same likelihood in arrays of few shapes."""
+        """The same likelihood with numbers of scores of which there are few."""
         g, k = self.estimate.shape
         total = SCORES_TOGETHER * max(1, -(-k // SCORES_TOGETHER))
         covariance = np.tile(np.eye(total), (g, 1, 1))
         covariance[:, :k, :k] = self.covariance
         more = (0, total - k)
         return self._replace(
-            gp=padded(self.gp, total, padded_rows(len(self.gp.data.u))),
+            gp=padded(self.gp, total),
             used=np.pad(self.used, more),
             estimate=np.pad(self.estimate, ((0, 0), more)),
             covariance=covariance,
-            success=padded_success(self.success),
-            size=None if self.size is None else self.size.padded(),
         )
 
 

@@ -14,8 +14,6 @@ from ..gp.process import (
     condition,
     coordinates,
     covariance,
-    padded,
-    padded_rows,
     predict,
 )
 
@@ -98,8 +96,3 @@ def log_success(gp: GP | None, u: Any) -> Any:
         return xp.zeros(len(u))
     mean, variance = predict(gp, u)
     return log_ndtr(mean[0] / xp.sqrt(1.0 + variance[0]))
-
-
-def padded_success(gp: GP | None) -> GP | None:
-    """The same in arrays of few shapes."""
-    return None if gp is None else padded(gp, 1, padded_rows(len(gp.data.u)))

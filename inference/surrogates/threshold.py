@@ -8,8 +8,8 @@ from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri, owens_t
 
 from ..gp.namespaces import log_ndtr, log_sum_exp, namespace
-from ..gp.process import GP, padded, padded_rows, predict
-from .success import log_success, padded_success
+from ..gp.process import GP, predict
+from .success import log_success
 from .transform import Transform
 
 
@@ -22,12 +22,6 @@ class ThresholdState(NamedTuple):
     resolution: np.ndarray  # [], sd of the latent mean from which doubt counts against a place
     success: GP | None = None  # see `success.learn_success`
     doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts
-
-    def padded(self) -> "ThresholdState":
-        """The same likelihood in arrays of few shapes."""
-        k, n = self.gp.weights.shape
-        success = padded_success(self.success)
-        return self._replace(gp=padded(self.gp, k, padded_rows(n)), success=success)
 
 
 class Quantile(NamedTuple):

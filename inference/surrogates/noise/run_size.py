@@ -12,8 +12,6 @@ from ...gp.process import (
     Hyper,
     condition,
     leave_one_out,
-    padded,
-    padded_rows,
     predict_mean,
 )
 
@@ -28,10 +26,6 @@ class Size(NamedTuple):
     gp: GP
     low: np.ndarray  # []
     high: np.ndarray  # []
-
-    def padded(self) -> "Size":
-        """The same in arrays of few shapes."""
-        return self._replace(gp=padded(self.gp, 1, padded_rows(len(self.gp.data.u))))
 
 
 def log_size(size: Size, u: Any) -> Any:
