@@ -34,8 +34,8 @@ from .simulations.job import BATCH
 from .simulations.returned import told_signals
 from .sobol import sobol, start_size
 from .surrogates.base import Acquisition, Measured, TrainingData
+from .surrogates.discrepancy import is_outlier
 from .surrogates.families import Family, checked_observed, resolve
-from .surrogates.outliers import is_outlier
 from .surrogates.success import RunOutcomes
 from .surrogates.warnings import complain
 from .types import Theta

@@ -10,10 +10,9 @@ from .._lazy import stats, xr
 from ..arguments import checked_array
 from ..prior import Prior
 from ..types import Simulator
-from .finished_replicates import Quantity, Replicates, checked_quantities
+from .finished_replicates import Quantity, Replicates, checked_quantities, table
 from .many_replicates import check_level, made_or_given
 from .one_replicate import Pipeline
-from .table import table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

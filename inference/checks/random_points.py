@@ -9,11 +9,10 @@ from .._lazy import stats, xr
 from ..prior import Prior
 from ..types import Simulator
 from . import bands
-from .finished_replicates import Replicates
+from .finished_replicates import Replicates, table
 from .many_replicates import check_level, made_or_given
 from .one_replicate import Pipeline
 from .ranks import quantiles, to_ranks
-from .table import table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

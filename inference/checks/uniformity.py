@@ -10,11 +10,10 @@ from .._lazy import stats, xr
 from ..prior import Prior
 from ..types import Simulator
 from . import bands
-from .finished_replicates import LOG_DENSITY, Quantity, Replicates, checked_quantities
+from .finished_replicates import LOG_DENSITY, Quantity, Replicates, checked_quantities, table
 from .many_replicates import check_level, made_or_given
 from .one_replicate import Pipeline
 from .ranks import bin_count, to_ranks
-from .table import table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,7 +13,7 @@ from .._float64 import in_float64
 from .._lazy import stats
 from ..arguments import checked_array, checked_number
 from ..surrogates.measurement_noise import Layout
-from .measurement_noise import Noise, SumOfNoises, gaussian, samples
+from .measurement_noise import Noise, SumOfNoises, gaussian, samples, stationary
 
 REPEATED = 0.85
 """Correlation of a simulator's errors in two repetitions of one experiment. Of the stirs of the
@@ -142,13 +142,13 @@ def _conditional(
         if one.correlation > MIN_CORRELATION and len((there := samples(one.residual)).sample)
     ]
     by_lag = usual._over([at, *(there for _, there in told)])
-    alone = _between(by_lag, at, at)
+    alone = stationary(by_lag, at, at)
     if not told or not by_lag.any():
         return _frozen(np.zeros(len(at.sample))), _frozen(alone)
-    across = np.vstack([one.correlation * _between(by_lag, there, at) for one, there in told])
+    across = np.vstack([one.correlation * stationary(by_lag, there, at) for one, there in told])
     errors = np.block(
         [
-            [_correlation(one, other) * _between(by_lag, there, where) for other, where in told]
+            [_correlation(one, other) * stationary(by_lag, there, where) for other, where in told]
             for one, there in told
         ]
     )
@@ -174,12 +174,6 @@ def _likeness(away: np.ndarray | float) -> np.ndarray:
 def _correlation(one: CleanData, other: CleanData) -> float:
     """Of the simulator's errors on two repetitions."""
     return 1.0 if one is other else REPEATED * float(_likeness(one.away - other.away))
-
-
-def _between(by_lag: np.ndarray, one: Layout, other: Layout) -> np.ndarray:
-    """Covariance [n, m] of n samples and m others of one stationary process in each channel."""
-    apart = np.abs(np.subtract.outer(one.sample, other.sample))
-    return by_lag[apart] * np.equal.outer(one.channel, other.channel)
 
 
 def usual_residual(

@@ -16,7 +16,6 @@ from ..gp.process import (
     leave_one_out_errors,
     predict,
 )
-from .outliers import is_outlier
 from .threshold import (
     Matched,
     Threshold,
@@ -38,6 +37,8 @@ BETWEEN = 0.25  # of the least simulated discrepancy: the least that is taken fo
 MIN_RESOLUTION = 1e-4  # of the spread of g(Delta)
 UNKNOWN_FREEDOM = 20.0  # errors more than parameters, where nothing tells their number
 LOW = 3.0  # sds of a new discrepancy by which a threshold lies too low
+BEST_SHARE = 0.25  # of the runs, which tell how far discrepancies spread
+MAX_DEVIATIONS = 1e9  # of that spread, beyond which a discrepancy is absurd
 TRANSFORM_GROWTH = 1.3  # the transform is chosen anew when data have grown by this factor
 
 
@@ -220,6 +221,15 @@ def learn(
     best = int(np.argmax(scores))
     chosen = DiscrepancySurrogate(fitted[best], options[best], values, np.nan, n, n)
     return with_threshold(chosen, None)
+
+
+def is_outlier(discrepancy: np.ndarray) -> np.ndarray:
+    """Which of the discrepancies [n] are absurdly larger than the best quarter, bool [n]; NaN is
+    not. Most runs may have blown up, or hold a number such as 1e16 in place of infinity."""
+    deviation = discrepancy - np.nanmin(discrepancy, initial=np.inf)
+    finite = deviation[np.isfinite(deviation)]
+    spread = np.quantile(finite, BEST_SHARE) if finite.size else 0.0
+    return (deviation / MAX_DEVIATIONS > spread) & (spread != 0.0)
 
 
 def _fit(data: Data) -> GP:

@@ -16,7 +16,6 @@ from ..gp.process import (
     leave_one_out_errors,
 )
 from ..gp.process import predict as predict_scores
-from .component_noise import absorbed_noise, left_over
 from .components import Basis, principal_components
 from .measurement_noise import MIN_SIZE, Remainder, shrunk_covariance
 from .noise.run_size import EQUAL_RUNS_TOLERANCE, Size, learn_size, run_spread
@@ -29,6 +28,7 @@ PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
 MIN_NOISE_SHARE = 0.01  # share of noise in the outputs' variance from which its size may vary
 SIZE_ROUNDS = 2  # of learning sizes from errors, and the emulator with these sizes
 TOO_SMALL = 0.01  # probability that repeated runs differ by less than they may
+MAX_ABSORBED_SHARE = 0.9  # of a score that may count as its own run's noise
 LEAST_OF_ERROR = 0.05  # of an expected squared error, added before its logarithm is taken
 
 
@@ -249,6 +249,38 @@ def run_to_run(gp: GP, basis: Basis, white: float, n: int) -> np.ndarray:
     np.fill_diagonal(correlation, 1.0)
     sd = np.sqrt(variance)
     return correlation * np.outer(sd, sd)
+
+
+def absorbed_noise(basis: Basis, noise: np.ndarray, remainder: Remainder, n: int) -> np.ndarray:
+    """Share [k] of the scores of n runs that is these runs' own noise.
+
+    A principal component leans towards the noise of the runs that it is computed from, so their
+    scores contain that noise and a new run's do not: to first order by the noise's variance
+    across the component over n times the component's variance (Nadler 2008, finite sample
+    perturbation of principal components). Without a correction the emulator is too steep by that
+    share, most of all in the weak components of few, long and noisy outputs.
+
+    Args:
+        noise: Run-to-run variances of the scores [k].
+        remainder: What the components leave.
+    """
+    squared = np.sum(basis.vectors**2, 0)
+    total = np.sum(noise * squared) + remainder.total
+    across = np.maximum(total - noise * squared, 0.0)
+    share = np.where(squared > 0.0, across / (n * np.where(squared > 0.0, squared, 1.0)), 0.0)
+    return np.minimum(share, MAX_ABSORBED_SHARE)
+
+
+def left_over(
+    basis: Basis, noise: np.ndarray, remainder: Remainder, excess: np.ndarray
+) -> Remainder:
+    """`remainder`, plus the noise wrongly attributed to the components.
+
+    Args:
+        noise: Run-to-run variances of the scores, without the excess [k].
+    """
+    taken = np.sum(noise * ((1.0 - excess) ** -2 - 1.0) * np.sum(basis.vectors**2, 0))
+    return remainder._replace(white=remainder.white + float(taken) / len(basis.vectors))
 
 
 def loo_errors(emulator: Emulator) -> np.ndarray:

@@ -23,7 +23,7 @@ from .signal import MIN_FREEDOM, SignalSurrogate, observe
 from .squared_difference import evaluate, failed_on, independent, numbers, squared_difference
 from .success import learn_success
 from .threshold import Matched, Threshold, check_rule
-from .transform import TRANSFORMS
+from .transform import check_transform
 from .warnings import GUESSED, NEGATIVE, distance_warnings
 
 MAX_COMPONENTS = 8
@@ -56,10 +56,7 @@ class DiscrepancyFamily:
     def __post_init__(self) -> None:
         check_rule(self.threshold)
         check_callable("discrepancy", self.discrepancy)
-        if self.transform is not None and self.transform not in tuple(TRANSFORMS):
-            raise ValueError(
-                f"transform must be one of {tuple(TRANSFORMS)} or None, got {self.transform!r}"
-            )
+        check_transform(self.transform)
 
     def learner(self, observed: np.ndarray) -> "DiscrepancyLearner":
         return DiscrepancyLearner(self, _distance(self.discrepancy, observed), observed)
