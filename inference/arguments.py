@@ -15,7 +15,7 @@ NUMBERS = "biufV"  # kinds of dtypes that become float64; V is bfloat16 and its 
 
 
 class Unusable(ValueError):
-    """What came is no array of numbers, or not of the shape that is needed.
+    """Not an array of numbers, or not of the shape that is needed.
 
     Args:
         got: What came, in a few words.
@@ -86,7 +86,7 @@ def _number(item: Any) -> float:
 
 
 def described(value: object) -> str:
-    """What came, in a few words for a message."""
+    """Type, shape and dtype of a value, for a message."""
     if value is None:
         return "None"
     kind = type(value).__name__

@@ -202,7 +202,7 @@ class Bolfi:
         return self.prior.to_dict(asked)
 
     def _designed_now(self, n: int) -> int:
-        """How many of the next n points the start design provides."""
+        """Number of the next n points that come from the start design."""
         if self.succeeded < MIN_LEARN:
             return n
         covered = self.succeeded + len(self._state.pending)
@@ -346,7 +346,7 @@ class Bolfi:
         warn: bool = True,
         stacklevel: int = 2,
     ) -> Fit:
-        """What can be concluded from the simulations told so far.
+        """Fit the surrogate to the simulations told so far.
 
         Args:
             seconds: Times that the caller measured (such as the simulator's), to be kept.

@@ -52,7 +52,7 @@ class History(NamedTuple):
         return len(rows) - len({self._run(i) for i in rows})
 
     def _run(self, row: int) -> tuple[bytes, int]:
-        """What a run's signal should follow from: theta and seed."""
+        """Theta and seed of a run, which should determine its signal."""
         return self.theta[row].tobytes(), int(self.seeds[row])
 
     @property

@@ -1,4 +1,4 @@
-"""What a run concludes: posterior, best hypothesis, surrogate, simulations."""
+"""The result of a run: posterior, best hypothesis, surrogate, simulations."""
 
 import time
 import warnings
@@ -193,7 +193,7 @@ class Fit:
         return float(np.max(np.hypot(sd, mean - sure_mean) / np.maximum(sure_sd, LEAST)))
 
     def _data_warnings(self) -> list[str]:
-        """What the observed output itself shows where it is compared."""
+        """Warnings about the observed output."""
         own = {self.settings.get("summary", "None"), self.settings.get("discrepancy")}
         said = censored_warnings(self.observed, self.closest.signal) if own == {"None"} else []
         if isinstance(self.learned, SignalSurrogate) and self.learned.known is None:
@@ -202,7 +202,7 @@ class Fit:
 
     @property
     def unreached(self) -> list[str]:
-        """That an emulated number lies beyond all simulated ones, if it does."""
+        """Warning that an emulated number lies beyond all simulated ones, if it does."""
         if not isinstance(self.learned, SignalSurrogate):
             return []
         values = self.learned.scale.observed
@@ -237,7 +237,7 @@ class Fit:
 
     @property
     def failures(self) -> dict[str, int]:
-        """How many simulations failed, by kind: "raised", "not finite", "timeout", "unusable" (no
+        """Numbers of failed simulations by kind: "raised", "not finite", "timeout", "unusable" (no
         signal), "incomparable" (your own discrepancy or summary failed) or "impossible"."""
         return self.history.failures
 

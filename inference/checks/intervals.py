@@ -24,7 +24,7 @@ DRAWN_LEVELS = 100  # at which the curve of a figure is drawn
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
-    """How many of R central intervals held the truth.
+    """Numbers of R central intervals that held the truth.
 
     Attributes:
         replicates: What was counted.

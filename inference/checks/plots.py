@@ -1,4 +1,4 @@
-"""What the figures of all checks have in common. Matplotlib is imported by whoever asks for one."""
+"""Band, axes and legend of the checks' figures; imports Matplotlib."""
 
 from typing import TYPE_CHECKING, Any
 

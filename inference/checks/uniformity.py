@@ -129,7 +129,7 @@ class SBC:
 
 
 def _shape(name: str, ranks: np.ndarray, draws: int) -> str:
-    """What a departure from uniform ranks means, where it has one of the plain shapes."""
+    """Meaning of a departure from uniform ranks of a plain shape; "" for any other."""
     u = (ranks + 0.5) / (draws + 1) - 0.5
     n = len(u)
     shift = u.mean() * np.sqrt(12 * n)

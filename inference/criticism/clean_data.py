@@ -35,7 +35,7 @@ def own_residual(
     keeping: Keeping,
     start: int = Plan.start,
 ) -> OwnResidual:
-    """What the calibrated base model leaves of data in which no effect is expected.
+    """Residual of the calibrated base model on data in which no effect is expected.
 
     Args:
         start: Runs all over the prior, before those where the model fits best.

@@ -183,7 +183,7 @@ def _check_varying(rests: list[np.ndarray], trend: int) -> None:
 
 
 def _detrended(rest: np.ndarray, degree: int) -> np.ndarray:
-    """What polynomials leave of a stretch [samples, channels]."""
+    """Residuals of a stretch [samples, channels] about polynomials in time."""
     powers = np.linspace(-1.0, 1.0, len(rest))[:, None] ** np.arange(degree + 1)
     return rest - powers @ np.linalg.lstsq(powers, rest)[0]
 

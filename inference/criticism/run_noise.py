@@ -1,4 +1,4 @@
-"""What runs of equal parameters differ by, as a covariance over the output."""
+"""Covariance of the differences between runs of equal parameters."""
 
 from collections.abc import Sequence
 

@@ -60,7 +60,7 @@ def minimise_many(
 
 
 class Points(NamedTuple):
-    """Where k searches are, and what they found there."""
+    """Positions, values and gradients of k searches."""
 
     x: np.ndarray  # [k, d]
     value: np.ndarray  # [k]

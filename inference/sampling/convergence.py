@@ -13,7 +13,7 @@ DIVERGENT_SHARE = 0.01
 
 
 class ConvergenceStatus(StrEnum):
-    """What came of sampling; each text is what to do about it."""
+    """Outcome of sampling; each text says how to mend it."""
 
     CONVERGED = "converged"
     TOO_FEW_DRAWS = (
@@ -74,7 +74,7 @@ def limits(chains: int, draws: int) -> tuple[float, float]:
 def shortfall(
     measures: Mapping[str, Mapping[str, float]], chains: int, draws: int, steps: int
 ) -> str:
-    """What misses its limit, NaN included, where it is worst, and what to do; "" if nothing does.
+    """Measures beyond their limits, NaN included, where they are worst; "" if there are none.
 
     Args:
         measures: Parameter -> as from `diagnose`.

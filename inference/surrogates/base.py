@@ -31,7 +31,7 @@ class Measured(NamedTuple):
 
 
 class Surrogate(Protocol):
-    """What was learned from the simulations, over prior quantiles u in [0, 1]^d."""
+    """A likelihood learned from simulations, over prior quantiles u in [0, 1]^d."""
 
     @property
     def gp(self) -> GP:
@@ -79,15 +79,15 @@ class Surrogate(Protocol):
         ...
 
     def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
-        """What `predict` predicts, of n finished runs [n, ...]."""
+        """The quantity of `predict`, for n finished runs [n, ...]."""
         ...
 
     def constants(self) -> dict[str, np.ndarray]:
-        """What a reader of the posterior must know of the likelihood."""
+        """Constants of the likelihood, kept with the posterior."""
         ...
 
     def described(self) -> list[str]:
-        """What a reader of the fit should know first, in a few words."""
+        """The most important constants, in a few words."""
         ...
 
     def checks(self) -> dict[str, np.ndarray]:
@@ -101,7 +101,7 @@ class Surrogate(Protocol):
         ...
 
     def warnings(self, *, confirmed: bool = False) -> list[str]:
-        """What is complained of, in sentences.
+        """Warnings, in sentences.
 
         Args:
             confirmed: Runs at draws of the posterior left it where it was: then errors of the
@@ -157,7 +157,7 @@ class SurrogateView:
     @property
     @in_float64
     def warnings(self) -> list[str]:
-        """What the surrogate's own checks complain of, in sentences."""
+        """Warnings of the surrogate's own checks, in sentences."""
         return self.learned.warnings()
 
 

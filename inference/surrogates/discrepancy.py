@@ -136,7 +136,7 @@ class DiscrepancySurrogate:
         return replace(self, gp=fantasize(self.gp, u)) if len(u) else self
 
     def constants(self) -> dict[str, np.ndarray]:
-        """What a reader of the posterior must know of the likelihood."""
+        """The threshold, on the scale of g(Delta)."""
         return {"threshold": np.asarray(self.threshold)}
 
     def described(self) -> list[str]:
@@ -155,7 +155,7 @@ class DiscrepancySurrogate:
         return self.equal or bool((self.threshold > mean - low).any())
 
     def warnings(self, *, confirmed: bool = False) -> list[str]:
-        """What the process's errors complain of, unless it is confirmed, and what was compared."""
+        """Warnings of the process's errors, unless it is confirmed, and of what was compared."""
         if self.equal:
             return [EQUAL]
         said = [*self.said]

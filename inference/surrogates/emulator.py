@@ -33,7 +33,7 @@ LEAST_OF_ERROR = 0.05  # of an expected squared error, added before its logarith
 
 
 class EmulatorLimits(NamedTuple):
-    """How much an emulator may hold.
+    """Limits of an emulator.
 
     Attributes:
         components: At most.
@@ -48,7 +48,7 @@ class EmulatorLimits(NamedTuple):
 
 
 class Emulator(NamedTuple):
-    """What simulations teach of the output, whatever was observed.
+    """Emulator of the simulator's output, whatever was observed.
 
     Attributes:
         gp: One process for each of k scores; the empty ones are flat.
@@ -140,7 +140,7 @@ def _learned(
 
 
 def _left(basis: Basis, outputs: np.ndarray, spread: np.ndarray | None) -> Remainder:
-    """What the components leave of outputs [n, m], for noise of the size 1."""
+    """Covariance of outputs [n, m] less their components, for noise of the size 1."""
     residuals = basis.residuals(outputs)
     if spread is not None:  # scaled to one length: unlike sizes would look like correlation
         length = np.linalg.norm(residuals, axis=1)
@@ -339,7 +339,7 @@ def mean(emulator: Emulator, u: np.ndarray) -> np.ndarray:
 
 
 def left_out(emulator: Emulator) -> np.ndarray:
-    """What all other runs predict of each run, components and hyperparameters kept: [n, m]."""
+    """Leave-one-out predictions, components and hyperparameters kept: [n, m]."""
     return _outputs(emulator.basis, leave_one_out(emulator.gp)[0])
 
 

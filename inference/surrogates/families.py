@@ -229,7 +229,7 @@ class SignalLearner:
         return Measured(features, np.where(failed, np.nan, discrepancy), errors)
 
     def _infinite_summary(self, signal: np.ndarray | None) -> str:
-        """What is kept of a finite signal whose summary is not; "" of any other."""
+        """Error of a finite signal whose summary is not finite; "" for any other."""
         compared = self.family.summary is not None and self.family.discrepancy is None
         if not compared or signal is None or not np.isfinite(signal).all():
             return ""
@@ -323,7 +323,7 @@ def resolve(surrogate: str | Family | None, options: dict) -> Family:
 
 
 def checked_observed(observed: ArrayLike | None, family: Family) -> np.ndarray:
-    """What was observed; NaN where the simulator returns the likelihood.
+    """The observed output; NaN where the simulator returns the likelihood.
 
     Raises:
         ValueError: something was observed but shall not, or shall but was not, or is infinite.

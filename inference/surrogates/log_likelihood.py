@@ -58,7 +58,7 @@ class LogLikelihoodScale(NamedTuple):
         return self.top - expanded(self.location + self.spread * latent, self.linear)
 
     def folds(self, values: np.ndarray) -> np.ndarray:
-        """By how much nats at these log likelihoods are compressed, 1 near the top."""
+        """Factors by which nats at these log likelihoods are compressed, 1 near the top."""
         return np.maximum((self.top - values) / self.linear, 1.0)
 
 
@@ -75,7 +75,7 @@ def expanded(height: Any, linear: float | np.ndarray) -> Any:
 
 
 class LevelState(NamedTuple):
-    """What the likelihood depends on.
+    """Arrays on which the likelihood depends.
 
     A fit takes the harmonic mean of what the likelihood may be, a search the bound that lies
     `optimism` sds above its median.
@@ -209,7 +209,7 @@ class LogLikelihoodSurrogate:
         return True
 
     def warnings(self, *, confirmed: bool = False) -> list[str]:
-        """What the leave-one-out errors complain of, of depths that count, unless confirmed; and
+        """Warnings of the leave-one-out errors at depths that count, unless confirmed; and
         that much of what may be the posterior lies where the log likelihood is hardly known."""
         if np.ptp(self.values) <= 1e-12 * np.abs(self.values).max():
             return [EQUAL]

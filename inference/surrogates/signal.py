@@ -156,7 +156,7 @@ class SignalSurrogate:
 
     @property
     def best_features(self) -> np.ndarray:
-        """What is predicted at the best parameters, on the emulator's scale [m]."""
+        """Predicted features at the best parameters, on the emulator's scale [m]."""
         return predict(self.emulator, self.minimum()[None])[0][0]
 
     @property
@@ -165,7 +165,7 @@ class SignalSurrogate:
         return float(self.node_weights[self.nodes.sigma > 0.0].sum())
 
     def constants(self) -> dict[str, np.ndarray]:
-        """What a reader of the posterior must know of the likelihood."""
+        """Components, variances and noise."""
         weights = self.node_weights
         needed = self.known is None or self._missed()
         misfit = needed * np.sqrt(weights @ self.nodes.sigma**2) * self.emulator.basis.scale
@@ -210,8 +210,7 @@ class SignalSurrogate:
         return not (self._missed() or self._smooth() or self._outside())
 
     def warnings(self, *, confirmed: bool = False) -> list[str]:
-        """What the emulator's own checks complain of, unless it is confirmed, and what the data
-        show."""
+        """Warnings of the emulator's own checks, unless it is confirmed, and of the data."""
         repeats, sized = self.emulator.repeats, self.emulator.size is not None
         if self.emulator.basis.used == 0 and not sized:
             if self.emulator.equal:

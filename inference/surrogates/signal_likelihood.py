@@ -19,7 +19,7 @@ WALL = 0.01  # of prior quantiles, beyond a box, over which the likelihood vanis
 
 
 class SignalState(NamedTuple):
-    """What the likelihood depends on: k scores, g nodes of the noise.
+    """Arrays on which the likelihood depends: k scores, g nodes of the noise.
 
     Scores that only fill an array come last, have `used` 0 and count as known.
     """
@@ -58,7 +58,7 @@ class SignalState(NamedTuple):
 def state_of(
     emulator: Emulator, reduced: Reduced, box: tuple[np.ndarray, np.ndarray] | None = None
 ) -> SignalState:
-    """What the likelihood depends on: of the components in use."""
+    """The state of the components in use."""
     used, d = emulator.basis.used, emulator.gp.data.u.shape[1]
     state = SignalState(
         emulator.gp.only(slice(used)),
@@ -103,8 +103,7 @@ def node_log_densities(state: SignalState, u: Any) -> Any:
 
 
 def _noise_factor(state: SignalState, size: Size, u: Any) -> Any:
-    """By how much the variance of all noise is larger at u than at size 1 of the run-to-run noise,
-    [n, g].
+    """The variance of all noise at u over that at size 1 of the run-to-run noise, [n, g].
 
     Exact where a node has no other noise, or next to no run-to-run noise; between the two, all of
     a node's noise keeps its shape while it grows.
@@ -120,7 +119,7 @@ def scores(state: SignalState, u: Any) -> tuple[Any, Any]:
 
 
 def _wall(state: SignalState, u: Any) -> Any:
-    """What the log likelihood loses outside of the box, Gaussian: gradients can climb it."""
+    """Penalty of the log likelihood outside of the box, Gaussian: gradients can climb it."""
     xp = namespace(u)
     outside = xp.maximum(state.low - u, 0.0) + xp.maximum(u - state.high, 0.0)
     return 0.5 * xp.sum((outside / WALL) ** 2, axis=-1)

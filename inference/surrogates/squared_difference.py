@@ -112,7 +112,7 @@ def evaluate(
 
 
 def failed_on(named: str, signal: np.ndarray, observed: np.ndarray, error: BaseException) -> str:
-    """What is kept of an error of the user's function that was given this signal."""
+    """Error text for a signal on which the user's function failed."""
     return incomparable(
         f"the {named} failed on a signal of shape {signal.shape}, observed being of shape "
         f"{observed.shape} ({raised(error)})"
@@ -129,7 +129,7 @@ def _number(named: str, returned: object) -> float:
 
 
 def numbers(residual: np.ndarray) -> float:
-    """How many numbers were observed."""
+    """Number of observed values."""
     return float(np.isfinite(residual).sum())
 
 

@@ -14,7 +14,7 @@ from .transform import Transform
 
 
 class ThresholdState(NamedTuple):
-    """What the likelihood depends on; threshold in the standardised units of the GP."""
+    """Arrays on which the likelihood depends; threshold in the standardised units of the GP."""
 
     gp: GP  # one process
     threshold: np.ndarray  # []

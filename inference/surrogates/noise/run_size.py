@@ -34,7 +34,7 @@ def log_size(size: Size, u: Any) -> Any:
 
 
 def run_spread(size: Size | None, u: np.ndarray) -> np.ndarray | None:
-    """By how much the noise's variance is larger at u [n, d] than at the size 1, [n]."""
+    """The noise's variance at u [n, d] over that of the size 1, [n]."""
     return None if size is None else np.exp(2.0 * log_size(size, u))
 
 

@@ -126,7 +126,7 @@ OutputScale = Plain | ByMean
 
 
 def comparable(scale: OutputScale, output: Output) -> Callable[[np.ndarray], np.ndarray]:
-    """What makes features comparable: features [n, m] -> [m]."""
+    """Scales of features: features [n, m] -> [m]."""
     unit = scale.unit
     return output.scale if unit is None else lambda _: unit
 
