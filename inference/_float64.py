@@ -30,6 +30,8 @@ def in_float64[**P, R](function: Callable[P, R]) -> Callable[P, R]:
     to the whole process: other Python threads have one, too, while the engine computes. A caller
     may have made NumPy or JAX raise where the engine looks at what is not finite by itself, and JAX
     stricter about shapes and types than it and NumPyro are.
+
+    It stands where users enter the engine, not on what these functions call.
     """
 
     @functools.wraps(function)

@@ -15,7 +15,7 @@ NUMBERS = "biufV"  # kinds of dtypes that become float64; V is bfloat16 and its 
 
 
 class Unusable(ValueError):
-    """What came is no array of numbers, or not of the shape that is needed.
+    """Not an array of numbers, or not of the shape that is needed.
 
     Args:
         got: What came, in a few words.
@@ -86,7 +86,7 @@ def _number(item: Any) -> float:
 
 
 def described(value: object) -> str:
-    """What came, in a few words for a message."""
+    """Type, shape and dtype of a value, for a message."""
     if value is None:
         return "None"
     kind = type(value).__name__
@@ -217,18 +217,3 @@ def check_callable(name: str, value: object) -> None:
     """Raise ValueError unless `value` is a function or None."""
     if value is not None and not callable(value):
         raise ValueError(f"{name} must be a function or None, got {value!r:.100}")
-
-
-def checked_points(u: object, dimension: int) -> np.ndarray:
-    """Prior quantiles u as float64 [n, dimension].
-
-    Raises:
-        ValueError: of another shape.
-    """
-    points = checked_array("u", u)
-    if points.ndim != 2 or points.shape[1] != dimension:
-        raise ValueError(
-            f"u must have shape [n, {dimension}], a row of prior quantiles for each point, "
-            f"got {points.shape}"
-        )
-    return points

@@ -58,7 +58,7 @@ def results_tree(
     observed: np.ndarray,
     simulations: xr.Dataset,
 ) -> xr.DataTree:
-    """What every result has: posterior, prior, sample_stats, observed_data, simulations.
+    """The groups that every result has: posterior, prior, sample_stats, observed_data, simulations.
 
     Args:
         prior: Gives names, units and descriptions to the parameters.

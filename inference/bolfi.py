@@ -35,8 +35,8 @@ from .simulations.job import BATCH
 from .simulations.returned import told_signals
 from .sobol import sobol, start_size
 from .surrogates.base import Acquisition, Measured, TrainingData
+from .surrogates.discrepancy import is_outlier
 from .surrogates.families import Family, checked_observed, resolve
-from .surrogates.outliers import is_outlier
 from .surrogates.success import RunOutcomes
 from .surrogates.warnings import complain
 from .types import Theta
@@ -101,7 +101,7 @@ class Bolfi:
             "seed": self.seed,
             "initial": self.initial,
         }
-        self._state = init(len(prior), self.observed.shape, self._learner.features)
+        self._state = init(len(prior), self.observed.shape, self._learner.measure([]).features)
         self._learned: Any = None  # the family's surrogate, once there is one
         self._before: Before | None = None  # the posterior of which `confirm` drew
         self._seconds = 0.0
@@ -203,12 +203,13 @@ class Bolfi:
         return self.prior.to_dict(asked)
 
     def _designed_now(self, n: int) -> int:
-        """How many of the next n points the start design provides."""
+        """Number of the next n points that come from the start design."""
         if self.succeeded < MIN_LEARN:
             return n
         covered = self.succeeded + len(self._state.pending)
         return min(n, max(0, self.initial - covered))
 
+    @in_float64
     def _acquired(self, n: int, designed: np.ndarray) -> np.ndarray:
         """theta [n, d] of the engine's choice, `designed` [m, d] being asked with them."""
         history = self._state.history
@@ -222,7 +223,7 @@ class Bolfi:
             key = jax.random.wrap_key_data(jax.device_put(words), impl="threefry2x32")
             fantasized = self._learned.fantasize(self.prior.to_unit(self.prior.to_dict(pending)))
             shape = n - len(parts), len(self.prior)
-            u = chosen(in_float64(self._acquire)(key, fantasized, shape[0]), shape)
+            u = chosen(self._acquire(key, fantasized, shape[0]), shape)
             parts.append(self.prior.to_array(self.prior.from_unit(u)))
         return np.concatenate(parts)
 
@@ -346,7 +347,7 @@ class Bolfi:
         warn: bool = True,
         stacklevel: int = 2,
     ) -> Fit:
-        """What can be concluded from the simulations told so far.
+        """Fit the surrogate to the simulations told so far.
 
         Args:
             seconds: Times that the caller measured (such as the simulator's), to be kept.
@@ -371,7 +372,7 @@ class Bolfi:
             )
         started = time.perf_counter()
         known, history = self._training_data(), self._state.history
-        fitted = self._learner.finish(known)
+        fitted = in_float64(self._learner.finish)(known)
         self._seconds += time.perf_counter() - started
         made = Fit(
             prior=self.prior,

@@ -41,7 +41,7 @@ def describe(value: Any) -> str:
 
 
 def _held(function: Any) -> str:
-    """What a method or closure brings along, in brackets; nothing for a plain function."""
+    """Object of a method, or variables of a closure, in brackets; "" for a plain function."""
     code, cells = getattr(function, "__code__", None), getattr(function, "__closure__", None) or ()
     names = code.co_freevars if code else ()
     # a function that calls itself is among its own cells

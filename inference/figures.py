@@ -70,13 +70,9 @@ def plot_predictive(
     draws = None
     if predicted is not None and predicted.shape[1:] == observed.shape:
         draws = np.stack([_channels(one) for one in predicted], axis=1)  # [channel, n, t]
-    if axes is None:
-        size = (5.2, 1.2 + 1.8 * len(panels))
-        axes = plt.subplots(len(panels), 1, figsize=size, sharex=True, layout="constrained")[1]
-    given = list(np.atleast_1d(axes).ravel())
-    if len(given) < len(panels):
-        raise ValueError(f"axes must hold one for each of {len(panels)} channels, got {len(given)}")
-    for j, (ax, values) in enumerate(zip(given, panels, strict=False)):
+    size = (5.2, 1.2 + 1.8 * len(panels))
+    given = some_axes(axes, len(panels), "channels", nrows=len(panels), figsize=size, sharex=True)
+    for j, (ax, values) in enumerate(zip(given, panels, strict=True)):
         index = np.arange(len(values))
         if draws is not None:
             low, middle, high = np.quantile(draws[j], PREDICTIVE_QUANTILES, axis=0)
@@ -88,8 +84,23 @@ def plot_predictive(
         ax.plot(index, values, ".", ms=3, color=OBSERVED, label="observed")
         bare(ax)
     given[0].legend(frameon=False, fontsize="small")
-    given[len(panels) - 1].set_xlabel("sample")
-    return given[: len(panels)]
+    given[-1].set_xlabel("sample")
+    return given
+
+
+def some_axes(axes: Any, count: int, of: str, **figure: Any) -> "list[Axes]":
+    """The first `count` of the axes that a user gives; None makes a `figure`, see plt.subplots.
+
+    Raises:
+        ValueError: these are no axes, or too few.
+    """
+    check_axes(axes)
+    if axes is None:
+        axes = plt.subplots(layout="constrained", **figure)[1]
+    given = list(np.atleast_1d(axes).ravel())
+    if len(given) < count:
+        raise ValueError(f"axes must hold one for each of {count} {of}, got {len(given)}")
+    return given[:count]
 
 
 def _channels(output: np.ndarray) -> np.ndarray:

@@ -52,7 +52,7 @@ class History(NamedTuple):
         return len(rows) - len({self._run(i) for i in rows})
 
     def _run(self, row: int) -> tuple[bytes, int]:
-        """What a run's signal should follow from: theta and seed."""
+        """Theta and seed of a run, which should determine its signal."""
         return self.theta[row].tobytes(), int(self.seeds[row])
 
     @property
@@ -75,14 +75,14 @@ class State(NamedTuple):
     rounds: int  # calls of ask
 
 
-def init(dimension: int, signal_shape: tuple[int, ...], features: int) -> State:
-    """Nothing asked, nothing told."""
+def init(dimension: int, signal_shape: tuple[int, ...], features: np.ndarray) -> State:
+    """Nothing asked, nothing told: `features` [0, m]."""
     rows, none = np.zeros((0, dimension)), np.zeros(0, np.int64)
     history = History(
         theta=rows,
         u=rows,
         signals=np.zeros((0, *signal_shape)),
-        features=np.zeros((0, features)),
+        features=features,
         discrepancy=np.zeros(0),
         seeds=none,
         rounds=none,

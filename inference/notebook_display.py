@@ -1,4 +1,4 @@
-"""How objects show themselves: the same rows as text, and as HTML in a notebook."""
+"""Rows of names and values as text, and as HTML in a notebook."""
 
 from collections.abc import Sequence
 from html import escape

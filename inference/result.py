@@ -1,4 +1,4 @@
-"""What a run concludes: posterior, best hypothesis, surrogate, simulations."""
+"""The result of a run: posterior, best hypothesis, surrogate, simulations."""
 
 import time
 import warnings
@@ -79,6 +79,7 @@ class Fit:
     def _repr_html_(self) -> str:
         return as_html("Fit", self._shown())
 
+    @in_float64
     def _shown(self) -> list[tuple[str, str]]:
         failed = ", ".join(f"{n} {kind}" for kind, n in self.failures.items())
         surrogate = f"{self.settings['surrogate']!r}, of {self.training_mask.sum()} simulations"
@@ -91,7 +92,6 @@ class Fit:
             ("warnings", "; ".join(self.warnings) or "none"),
         ]
 
-    @in_float64
     def _quantiles(self) -> list[str]:
         """Median and 90 % interval of each parameter."""
         theta = self.prior.from_unit(ndtr(self.population.x))
@@ -110,6 +110,7 @@ class Fit:
         )
 
     @cached_property
+    @in_float64
     def warnings(self) -> list[str]:
         """Sentences of what may be wrong, each with its cure.
 
@@ -135,6 +136,7 @@ class Fit:
         return said
 
     @property
+    @in_float64
     def status(self) -> str:
         """ "fitted"; "not confirmed", where runs at draws of the posterior moved it, or none were
         made, or the emulator's doubt makes it much wider; or, where that is not so or unknown, "not
@@ -156,6 +158,7 @@ class Fit:
         return explore(np.random.default_rng(0), self._target)
 
     @cached_property
+    @in_float64
     def confirmed(self) -> bool | None:
         """Whether what was simulated at draws of the posterior left it where it was, see
         `Before.holds`; None where nothing was."""
@@ -190,7 +193,7 @@ class Fit:
         return float(np.max(np.hypot(sd, mean - sure_mean) / np.maximum(sure_sd, LEAST)))
 
     def _data_warnings(self) -> list[str]:
-        """What the observed output itself shows where it is compared."""
+        """Warnings about the observed output."""
         own = {self.settings.get("summary", "None"), self.settings.get("discrepancy")}
         said = censored_warnings(self.observed, self.closest.signal) if own == {"None"} else []
         if isinstance(self.learned, SignalSurrogate) and self.learned.known is None:
@@ -199,7 +202,7 @@ class Fit:
 
     @property
     def unreached(self) -> list[str]:
-        """That an emulated number lies beyond all simulated ones, if it does."""
+        """Warning that an emulated number lies beyond all simulated ones, if it does."""
         if not isinstance(self.learned, SignalSurrogate):
             return []
         values = self.learned.scale.observed
@@ -211,6 +214,7 @@ class Fit:
         return SurrogateView(self.prior, self.learned)
 
     @property
+    @in_float64
     def best(self) -> dict[str, float]:
         """The surrogate's best point in the prior's box; theta* of the paper."""
         return {n: float(v) for n, v in self.prior.from_unit(self.learned.minimum()).items()}
@@ -233,7 +237,7 @@ class Fit:
 
     @property
     def failures(self) -> dict[str, int]:
-        """How many simulations failed, by kind: "raised", "not finite", "timeout", "unusable" (no
+        """Numbers of failed simulations by kind: "raised", "not finite", "timeout", "unusable" (no
         signal), "incomparable" (your own discrepancy or summary failed) or "impossible"."""
         return self.history.failures
 

@@ -13,7 +13,6 @@ import jax
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from .._float64 import in_float64
 from ..arguments import checked_number
 from ..gp.namespaces import log_sum_exp
 from ..gp.optimise import minimise_in_box
@@ -68,7 +67,6 @@ class LowerConfidenceBound:
     def __post_init__(self) -> None:
         checked_number("jitter", self.jitter, lambda sd: 0.0 < sd < np.inf, "positive")
 
-    @in_float64
     def __call__(self, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
         """n points u [n, d]; each is fantasized before the next is chosen."""
         rng, points = generator(key), []
@@ -127,7 +125,6 @@ def _normalised(log_weights: np.ndarray) -> np.ndarray:
     return weights / weights.sum()
 
 
-@in_float64
 def log_moments(surrogate: Surrogate, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """log E[L] and log Var[L] at u [n, d], L being known only through the surrogate."""
     first = surrogate.log_likelihood(surrogate.state, u)
@@ -140,7 +137,6 @@ Score = Callable[[np.random.Generator, Surrogate, Candidates], np.ndarray]
 """(rng, surrogate, candidates) -> log scores [CANDIDATES]."""
 
 
-@in_float64
 def best_candidates(score: Score, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
     """The candidates of highest score, each fantasized before the next is scored: [n, d].
 

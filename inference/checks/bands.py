@@ -19,7 +19,7 @@ SMALLEST_LEVEL = 1e-9
 
 
 class Band(NamedTuple):
-    """Where the counts of all ranks below z may lie, each array [k]."""
+    """Least and greatest counts of ranks below z, each array [k]."""
 
     z: np.ndarray
     lower: np.ndarray
@@ -27,7 +27,7 @@ class Band(NamedTuple):
 
 
 def counts_below(ranks: np.ndarray, draws: int) -> np.ndarray:
-    """How many ranks (0..draws) lie below 1, 2, .., draws: [draws]."""
+    """Number of ranks (0..draws) below 1, 2, .., draws: [draws]."""
     return np.cumsum(np.bincount(ranks, minlength=draws + 1))[:-1]
 
 

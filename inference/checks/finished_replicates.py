@@ -24,7 +24,7 @@ Values = dict[str, tuple[np.ndarray, np.ndarray]]
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Replicates:
-    """What a pipeline concluded from data whose truth is known; R finished replicates.
+    """Posterior draws of a pipeline for R data sets of known truth.
 
     Attributes:
         prior: Of the truths.
@@ -104,7 +104,7 @@ class Replicates:
         return {LOG_DENSITY: _split(rows, self)}
 
     def quantiles(self, values: Values) -> np.ndarray:
-        """Where each truth lies among its draws, [R, q] in [0, 1); see `ranks.quantiles`."""
+        """Randomised quantiles of truths among draws, [R, q] in [0, 1); see `ranks.quantiles`."""
         columns = [
             quantiles(truth, draws, self.random(name)) for name, (truth, draws) in values.items()
         ]
@@ -119,7 +119,7 @@ class Replicates:
 
     @property
     def warnings(self) -> list[str]:
-        """What is wrong with the replicates themselves, in sentences."""
+        """Too many failed replicates, or too few independent draws, in sentences."""
         tolerated = np.sqrt(max(len(self), 1)) / 2  # that many hide in a rank's standard error
         said = []
         if len(self.failed) > tolerated:
@@ -188,3 +188,17 @@ def _evaluated(
             f"got shape {values.shape} with {int(np.isnan(values).sum())} NaN"
         )
     return values
+
+
+def table(
+    heading: str, columns: Sequence[str], rows: Sequence[Sequence[str]], warnings: Sequence[str]
+) -> str:
+    """A heading, aligned columns (the first to the left), and what was found wrong."""
+    cells = [list(columns), *map(list, rows)]
+    widths = [max(len(row[j]) for row in cells) for j in range(len(columns))]
+    lines = [
+        "  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]).rstrip()
+        for row in cells
+    ]
+    verdict = [f"! {warning}" for warning in warnings] or ["ok"]
+    return "\n".join([heading, *lines, *verdict])

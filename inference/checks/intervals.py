@@ -10,21 +10,21 @@ from .._lazy import stats, xr
 from ..arguments import checked_array
 from ..prior import Prior
 from ..types import Simulator
-from .finished_replicates import Quantity, Replicates, checked_quantities
+from .finished_replicates import Quantity, Replicates, checked_quantities, table
 from .many_replicates import check_level, made_or_given
 from .one_replicate import Pipeline
-from .table import table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 CONFIDENCE = 0.99  # of the intervals shown for each rate
 POWER = 0.8  # of the coverage that is said to be found
+DRAWN_LEVELS = 100  # at which the curve of a figure is drawn
 
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
-    """How many of R central intervals held the truth.
+    """Numbers of R central intervals that held the truth.
 
     Attributes:
         replicates: What was counted.
@@ -120,10 +120,28 @@ class Coverage:
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Coverage minus its nominal level, with exact 99 % intervals at the levels."""
-        from .plots import Rates, plot_coverage
+        from matplotlib.ticker import PercentFormatter
 
-        rates = Rates(self.levels, self.rate, self.low, self.high)
-        return plot_coverage(self.names, self.quantiles, rates, ax)
+        from .plots import LEGEND_BELOW, axes, band, closed, colour, finish
+
+        ax = axes(ax)
+        n, q = self.quantiles.shape
+        z = band(ax, n, DRAWN_LEVELS - 1)  # |2 u - 1| is uniform like u
+        level = closed(z, 1.0)
+        for j, name in enumerate(self.names):
+            within = np.sort(2 * np.abs(self.quantiles[:, j] - 0.5))
+            curve = np.searchsorted(within, level, side="right") / n - level
+            ax.plot(level, curve, color=colour(j), lw=1.2, alpha=0.6)
+            shifted = self.levels + 0.008 * (j - (q - 1) / 2)  # so that bars do not hide each other
+            error = np.stack([self.rate - self.low, self.high - self.rate])[:, :, j]
+            excess = self.rate[:, j] - self.levels
+            style = {"fmt": "o", "ms": 4.5, "capsize": 2.5, "lw": 1.2}
+            ax.errorbar(shifted, excess, error, color=colour(j), label=name, **style)
+        ax.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+        ax.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
+        ax.set_xlabel("nominal level of the central interval")
+        ax.set_ylabel("truths held − nominal")
+        return finish(ax, n, **LEGEND_BELOW)
 
 
 def coverage(

@@ -36,7 +36,7 @@ class Pipeline(Protocol):
 
 
 class ReplicatePlan(NamedTuple):
-    """What all replicates have in common."""
+    """Settings that all replicates share."""
 
     pipeline: Pipeline
     simulate: Simulator

@@ -9,11 +9,10 @@ from .._lazy import stats, xr
 from ..prior import Prior
 from ..types import Simulator
 from . import bands
-from .finished_replicates import Replicates
+from .finished_replicates import Replicates, table
 from .many_replicates import check_level, made_or_given
 from .one_replicate import Pipeline
 from .ranks import quantiles, to_ranks
-from .table import table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,10 +98,20 @@ class Tarp:
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Expected coverage against credibility, with its bootstrap band and the diagonal."""
-        from .plots import Curve, plot_tarp
+        from ..figures import COLOURS
+        from .plots import axes, band, finish
 
-        curve = Curve(self.credibility, self.expected_coverage, self.low, self.high)
-        return plot_tarp(curve, len(self.replicates), self.replicates.most, ax)
+        ax = axes(ax, (4.4, 4.2))
+        n = len(self.replicates)
+        band(ax, n, self.replicates.most, diagonal=True)
+        ax.fill_between(self.credibility, self.low, self.high, color=COLOURS[0], alpha=0.25, lw=0)
+        label = "joint posterior, 95 % by bootstrap"
+        ax.plot(self.credibility, self.expected_coverage, color=COLOURS[0], lw=1.6, label=label)
+        ax.set_ylim(0.0, 1.0)
+        ax.set_aspect("equal")
+        ax.set_xlabel("credibility")
+        ax.set_ylabel("expected coverage")
+        return finish(ax, n, loc="upper left")
 
 
 def tarp(

@@ -10,11 +10,10 @@ from .._lazy import stats, xr
 from ..prior import Prior
 from ..types import Simulator
 from . import bands
-from .finished_replicates import LOG_DENSITY, Quantity, Replicates, checked_quantities
+from .finished_replicates import LOG_DENSITY, Quantity, Replicates, checked_quantities, table
 from .many_replicates import check_level, made_or_given
 from .one_replicate import Pipeline
 from .ranks import bin_count, to_ranks
-from .table import table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -88,19 +87,49 @@ class SBC:
 
         The band holds the whole curve of a calibrated quantity with probability `level`.
         """
-        from .plots import plot_ecdf_difference
+        from .plots import LEGEND_BELOW, axes, band, closed, colour, finish
 
-        return plot_ecdf_difference(self.names, self.ranks, self.draws, ax, level)
+        ax = axes(ax)
+        n = len(self.replicates)
+        z = band(ax, n, self.draws, level)
+        for j, name in enumerate(self.names):
+            below = bands.counts_below(self.ranks[:, j], self.draws) / n - z
+            ax.plot(closed(z, 1.0), closed(below, 0.0), color=colour(j), lw=1.6, label=name)
+        reach = 1.15 * np.abs(ax.dataLim.intervaly).max()
+        ax.set_ylim(-reach, reach)
+        ax.set_xlabel("rank of the truth among the draws, as a fraction")
+        ax.set_ylabel("ECDF − uniform")
+        return finish(ax, n, **LEGEND_BELOW)
 
     def histogram(self, axes: Any = None, level: float = 0.95) -> "list[Axes]":
         """Binned ranks, one axes per quantity; grey holds each bar with probability `level`."""
-        from .plots import plot_histograms
+        from ..figures import GREY, INK, bare, some_axes
+        from .plots import BAND, colour
 
-        return plot_histograms(self.names, self.ranks, self.draws, axes, level)
+        n, q = self.ranks.shape
+        size = (max(2.6 * q, 3.2), 2.6)
+        panels = some_axes(axes, q, "quantities", ncols=q, figsize=size, sharey=True)
+        bins = bin_count(n, self.draws)
+        low, high = stats.binom.interval(level, n, 1 / bins)
+        for j, (name, ax) in enumerate(zip(self.names, panels, strict=True)):
+            counts = np.bincount(self.ranks[:, j] * bins // (self.draws + 1), minlength=bins)
+            ax.axhspan(low, high, color=BAND, lw=0)
+            ax.axhline(n / bins, color=GREY, lw=0.8)
+            ax.stairs(
+                counts, np.linspace(0.0, 1.0, bins + 1), color=colour(j), fill=True, alpha=0.35
+            )
+            ax.stairs(counts, np.linspace(0.0, 1.0, bins + 1), color=colour(j), lw=1.2)
+            ax.set_xlim(0.0, 1.0)
+            ax.set_ylim(0.0, 1.15 * max(counts.max(), high))
+            ax.set_title(name, color=INK)
+            ax.set_xlabel("rank, as a fraction")
+            bare(ax)
+        panels[0].set_ylabel(f"replicates of {n}")
+        return panels
 
 
 def _shape(name: str, ranks: np.ndarray, draws: int) -> str:
-    """What a departure from uniform ranks means, where it has one of the plain shapes."""
+    """Meaning of a departure from uniform ranks of a plain shape; "" for any other."""
     u = (ranks + 0.5) / (draws + 1) - 0.5
     n = len(u)
     shift = u.mean() * np.sqrt(12 * n)

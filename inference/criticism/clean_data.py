@@ -38,7 +38,7 @@ def own_residual(
     report: Report = silent,
     start: int = Plan.start,
 ) -> OwnResidual:
-    """What the calibrated base model leaves of data in which no effect is expected.
+    """Residual of the calibrated base model on data in which no effect is expected.
 
     Args:
         compute: Where runs are made and kept.

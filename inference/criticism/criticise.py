@@ -32,7 +32,7 @@ from .verdict import REJECTION_LEVEL, Candidate, Verdict, VerdictKind, conclude,
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Criticism:
-    """What was found.
+    """Verdict on a model, its tests, and the explanations that were tried.
 
     Attributes:
         verdict: The conclusion.
@@ -132,8 +132,8 @@ class Criticism:
 
     @property
     def usual(self) -> float:
-        """RMS over the data of what is usual for the simulator besides what it is known to leave
-        of them, 0 where that is not known."""
+        """RMS of the simulator's usual error beyond its known residual; 0 where it is not
+        known."""
         return model_error_rms(self.noise, self.observed)
 
     @property

@@ -59,7 +59,7 @@ class Experiment:
 
     @property
     def corrected(self) -> np.ndarray:
-        """What was observed, less what the simulator is known to leave of it [*signal_shape]."""
+        """Observed less the simulator's known residual [*signal_shape]."""
         return self.observed - expected_model_error(self.noise, self.observed)
 
 

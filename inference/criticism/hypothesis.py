@@ -178,14 +178,14 @@ def hypothesise(
     near_best = around(u, found.sd, LATER_HALF_WIDTH, most=np.inf)
     sized, log_weight = _sized(noise, observed, surrogate)
     reduced = _reduced(surrogate, [own + one for one in sized])
-    believed = replace(
+    learned = replace(
         surrogate,
         reduced=reduced._replace(log_weight=reduced.log_weight + log_weight),
         nodes=Nodes(*(np.zeros(len(sized)) for part in Nodes._fields)),
         log_prior=log_weight,
         box=tuple(intersection(near_best, within)),
     )
-    return replace(found, fit=replace(fit, learned=believed))
+    return replace(found, fit=replace(fit, learned=learned))
 
 
 def _nearest(
@@ -248,5 +248,4 @@ def _squared_distance(state: SignalState, u: np.ndarray) -> np.ndarray:
 
 def values_of(output: Output, drawn: np.ndarray) -> np.ndarray:
     """Draws [n, samples] in the flattened order as values [n, m]."""
-    rank = np.argsort(np.argsort(output.present))
-    return output.average(drawn[:, rank].T).T
+    return output.average(drawn[:, output.rank].T).T

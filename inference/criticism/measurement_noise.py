@@ -66,11 +66,10 @@ class AutoregressiveNoise:
     samples: int = 0
 
     def covariance(self, at: Layout) -> np.ndarray:
-        apart = np.abs(np.subtract.outer(at.sample, at.sample))
-        lags = np.arange(apart.max() + 1)
+        lags = np.arange(np.ptp(at.sample) + 1)
         # the mean over the draws: what one sample predicts of another, all in all
         of_lag = np.mean(self.sd[:, None] ** 2 * self.correlation[:, None] ** lags, 0)
-        return of_lag[apart] * np.equal.outer(at.channel, at.channel)
+        return stationary(of_lag, at, at)
 
     def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
         which = rng.integers(len(self.sd), size=count)
@@ -102,6 +101,12 @@ def samples(observed: np.ndarray) -> Layout:
     at = np.flatnonzero(np.isfinite(observed))
     channels = int(np.prod(observed.shape[1:]))
     return Layout(at % channels, at // channels)
+
+
+def stationary(by_lag: np.ndarray, one: Layout, other: Layout) -> np.ndarray:
+    """Covariance [n, m] of n samples and m others of one stationary process in each channel."""
+    apart = np.abs(np.subtract.outer(one.sample, other.sample))
+    return by_lag[apart] * np.equal.outer(one.channel, other.channel)
 
 
 @in_float64
@@ -178,7 +183,7 @@ def _check_varying(rests: list[np.ndarray], trend: int) -> None:
 
 
 def _detrended(rest: np.ndarray, degree: int) -> np.ndarray:
-    """What polynomials leave of a stretch [samples, channels]."""
+    """Residuals of a stretch [samples, channels] about polynomials in time."""
     powers = np.linspace(-1.0, 1.0, len(rest))[:, None] ** np.arange(degree + 1)
     return rest - powers @ np.linalg.lstsq(powers, rest)[0]
 

@@ -29,7 +29,7 @@ class Window(NamedTuple):
 
 
 class Found(NamedTuple):
-    """How a model and the data disagree in a window.
+    """Disagreement of a model and the data in a window.
 
     Attributes:
         label: The window's.
@@ -45,7 +45,7 @@ class Found(NamedTuple):
 
 
 class Check(NamedTuple):
-    """How far a model is from the data.
+    """Test of a model against the data.
 
     Attributes:
         p_value: That a right model is as far; the smaller of the next two, corrected for
@@ -111,7 +111,7 @@ def check(hypothesis: Hypothesis, signatures: Mapping[str, Signature], null: np.
 
 @in_float64
 def locate(hypothesis: Hypothesis, windows: Sequence[Window], null: np.ndarray) -> list[Found]:
-    """Where a model and the data disagree, with one error rate for all windows (max statistic).
+    """Test the residual in each window, with one error rate for all windows (max statistic).
 
     In each window the slow part of the residual is looked at.
     """

@@ -20,7 +20,7 @@ RUNS_EACH = 3  # of each explanation in each proposed experiment
 
 
 class Suggestion(NamedTuple):
-    """How well an experiment would separate two explanations.
+    """Expected separation of two explanations by an experiment.
 
     Attributes:
         label: The experiment's.

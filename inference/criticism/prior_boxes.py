@@ -44,7 +44,7 @@ def hull(one: PriorBox, other: PriorBox) -> PriorBox:
 
 
 def intersection(one: PriorBox, other: PriorBox) -> PriorBox:
-    """Where both are."""
+    """The box that both have in common."""
     return PriorBox(np.maximum(one.low, other.low), np.minimum(one.high, other.high))
 
 

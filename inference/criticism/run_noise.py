@@ -1,4 +1,4 @@
-"""What runs of equal parameters differ by, as a covariance over the output."""
+"""Covariance of the differences between runs of equal parameters."""
 
 from collections.abc import Sequence
 
@@ -7,6 +7,7 @@ import numpy as np
 from ..gp.process import leave_one_out
 from ..surrogates.emulator import Emulator
 from ..surrogates.measurement_noise import Layout
+from .measurement_noise import stationary
 from .usual_residual import positive_autocovariance
 
 ALIKE_DISTANCE = 0.2  # of prior quantiles, over which a simulator's noise changes as a power
@@ -100,9 +101,7 @@ def _target(errors: np.ndarray, layout: Layout) -> np.ndarray:
         power = np.abs(np.fft.rfft(rows, 2 * lags, axis=1)) ** 2
         found += np.fft.irfft(power.mean(0), 2 * lags)[:lags] / lags
     correlation = positive_autocovariance(found / len(channels))
-    apart = np.abs(np.subtract.outer(layout.sample, layout.sample))
-    same = np.equal.outer(layout.channel, layout.channel)
-    return correlation[apart] * same * np.outer(size, size) / correlation[0]
+    return stationary(correlation, layout, layout) * np.outer(size, size) / correlation[0]
 
 
 def _shrunk(errors: np.ndarray, target: np.ndarray) -> np.ndarray:

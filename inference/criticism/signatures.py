@@ -17,7 +17,7 @@ FAINT_SHARE = 0.3  # a change shorter than this share of its visible length coun
 
 
 class Signature(NamedTuple):
-    """How an effect changes the data.
+    """Change of the data by an effect.
 
     Attributes:
         change: Of the expected values, any size [m].

@@ -1,4 +1,4 @@
-"""What a simulator usually gets wrong, learned from data believed to be clean."""
+"""A simulator's model error, learned from data in which no effect is believed to be missing."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from .._float64 import in_float64
 from .._lazy import stats
 from ..arguments import checked_array, checked_number
 from ..surrogates.measurement_noise import Layout
-from .measurement_noise import Noise, SumOfNoises, gaussian, samples
+from .measurement_noise import Noise, SumOfNoises, gaussian, samples, stationary
 
 REPEATED = 0.85
 """Correlation of a simulator's errors in two repetitions of one experiment. Of the stirs of the
@@ -77,7 +77,7 @@ class UsualResidual:
     clean: tuple[CleanData, ...] = ()
 
     def mean(self, at: Layout) -> np.ndarray:
-        """What the simulator is expected to leave [n]."""
+        """Expected residual of the simulator [n]."""
         return self._given(at)[0]
 
     def covariance(self, at: Layout) -> np.ndarray:
@@ -142,13 +142,13 @@ def _conditional(
         if one.correlation > MIN_CORRELATION and len((there := samples(one.residual)).sample)
     ]
     by_lag = usual._over([at, *(there for _, there in told)])
-    alone = _between(by_lag, at, at)
+    alone = stationary(by_lag, at, at)
     if not told or not by_lag.any():
         return _frozen(np.zeros(len(at.sample))), _frozen(alone)
-    across = np.vstack([one.correlation * _between(by_lag, there, at) for one, there in told])
+    across = np.vstack([one.correlation * stationary(by_lag, there, at) for one, there in told])
     errors = np.block(
         [
-            [_correlation(one, other) * _between(by_lag, there, where) for other, where in told]
+            [_correlation(one, other) * stationary(by_lag, there, where) for other, where in told]
             for one, there in told
         ]
     )
@@ -167,7 +167,7 @@ def _frozen(array: np.ndarray) -> np.ndarray:
 
 
 def _likeness(away: np.ndarray | float) -> np.ndarray:
-    """How alike a simulator's errors are in two regimes, from 0 to 1."""
+    """Correlation of a simulator's errors in two regimes, from 0 to 1."""
     return np.exp(-0.5 * np.square(away))
 
 
@@ -176,19 +176,13 @@ def _correlation(one: CleanData, other: CleanData) -> float:
     return 1.0 if one is other else REPEATED * float(_likeness(one.away - other.away))
 
 
-def _between(by_lag: np.ndarray, one: Layout, other: Layout) -> np.ndarray:
-    """Covariance [n, m] of n samples and m others of one stationary process in each channel."""
-    apart = np.abs(np.subtract.outer(one.sample, other.sample))
-    return by_lag[apart] * np.equal.outer(one.channel, other.channel)
-
-
 def usual_residual(
     residuals: Sequence[np.ndarray],
     noises: Sequence[Noise],
     same: Sequence[bool],
     away: Sequence[float] | np.ndarray | None = None,
 ) -> UsualResidual:
-    """What clean data teach.
+    """Learn a simulator's residual from clean data.
 
     Args:
         residuals: Clean data less the calibrated simulator's mean, each [T, channels] with
@@ -228,7 +222,7 @@ def usual_residual(
 def model_error(
     size: float, correlation: ArrayLike, freedom: float = KNOWN_FREEDOM
 ) -> UsualResidual:
-    """What a simulator is known to err by, without clean data to learn it from.
+    """A model error of known size and correlation, without clean data to learn it from.
 
     Like any noise it goes into `Experiment`, and into `fit` as `noise=`, beside that of the
     measurement: `SumOfNoises((KnownNoise(0.1), model_error(0.3, 6.0)))`. Errors that change as the
@@ -298,7 +292,7 @@ def _check_clean(clean: Sequence[CleanData]) -> None:
 
 
 def _weights(clean: Sequence[CleanData]) -> np.ndarray:
-    """How much each tells of the regime that is looked at: the nearest counts wholly."""
+    """Weights by the distance of regimes; the nearest has weight 1."""
     square = np.array([one.away**2 for one in clean])
     return np.maximum(np.exp(-0.5 * (square - np.min(square, initial=np.inf))), MIN_WEIGHT)
 
@@ -340,7 +334,7 @@ def model_error_rms(noise: Noise, observed: np.ndarray) -> float:
 
 
 def expected_model_error(noise: Noise, observed: np.ndarray) -> np.ndarray:
-    """What a simulator is expected to leave of data [*signal_shape]; 0 where nothing is known."""
+    """Expected residual of the simulator [*signal_shape]; 0 where nothing is known."""
     error, expected = model_error_part(noise), np.zeros(observed.shape)
     if error is not None:
         expected[np.isfinite(observed)] = error.mean(samples(observed))
@@ -358,7 +352,7 @@ def _autocovariance(residual: np.ndarray, lags: int) -> np.ndarray:
 
 
 def _expected_of(noise: Noise, samples: int, lags: int) -> np.ndarray:
-    """What `_autocovariance` is expected to find of so many samples of noise alone."""
+    """Expectation of `_autocovariance` for so many samples of noise alone."""
     at = Layout(np.zeros(samples, int), np.arange(samples))
     found = np.zeros(lags)
     found[:samples] = noise.covariance(at)[0] * (1.0 - np.arange(samples) / samples)

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import expit, logit
 
 from ..sobol import sobol
+from .process import GP, predict
 
 SCREENED_POINTS, REFINED_POINTS = 512, 3
 BOX_EDGE = 1e-6  # the box is [BOX_EDGE, 1 - BOX_EDGE]: beyond lie only tails of unbounded priors
@@ -59,7 +60,7 @@ def minimise_many(
 
 
 class Points(NamedTuple):
-    """Where k searches are, and what they found there."""
+    """Positions, values and gradients of k searches."""
 
     x: np.ndarray  # [k, d]
     value: np.ndarray  # [k]
@@ -135,6 +136,19 @@ def minimise_in_box(
 
     x, value = minimise_many(value_and_grad, logit(screen[order]), tolerance=1e-6)
     return np.clip(first + size * expit(x[np.argmin(value)]), BOX_EDGE, 1.0 - BOX_EDGE)
+
+
+def surely_least(gp: GP) -> np.ndarray:
+    """Where the mean of one process is surely low: minimiser u [d] of mean + sd.
+
+    The mean alone may be least in a corner where nothing was simulated.
+    """
+
+    def surely(u: np.ndarray) -> np.ndarray:
+        (mean,), (variance,) = predict(gp, u)
+        return mean + np.sqrt(variance)
+
+    return minimise_in_box(surely, gp.data.u.shape[1])
 
 
 def _signed(dimension: int) -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
-from ..arguments import checked_points
 from .namespaces import namespace, ndtri
 
 TREND_SD = 3.0
@@ -142,21 +141,18 @@ def fantasize(gp: GP, u: np.ndarray, spread: np.ndarray | None = None) -> GP:
     return condition(gp.hyper, Data(np.concatenate([data.u, u]), y, data.normal, spread))
 
 
-def padded(gp: GP, processes: int, rows: int) -> GP:
-    """The same with arrays of fixed shapes: points without weight, and processes of no use."""
+def padded(gp: GP, processes: int | None = None) -> GP:
+    """The same with arrays of few shapes: points without weight, up to a power of two, and
+    processes of no use, if more are wanted."""
     k, n = gp.weights.shape
-    more, extra = processes - k, rows - n
+    more = 0 if processes is None else processes - k
+    extra = max(MIN_ROWS, 1 << (n - 1).bit_length()) - n
     widths = ((0, more), (0, extra))
     hyper = Hyper(*(np.pad(part, ((0, more), *[(0, 0)] * (part.ndim - 1))) for part in gp.hyper))
     u = np.pad(gp.data.u, ((0, extra), (0, 0)), constant_values=0.5)
     data = gp.data._replace(u=u, y=np.pad(gp.data.y, widths), spread=None)
     whitener = np.pad(gp.whitener, (*widths, (0, extra)))
     return GP(hyper, data, whitener, np.pad(gp.weights, widths))
-
-
-def padded_rows(n: int) -> int:
-    """Rows for n points: powers of two, so that few programs are compiled while data grow."""
-    return max(MIN_ROWS, 1 << (n - 1).bit_length())
 
 
 def _cross(gp: GP, u: Any) -> tuple[Any, Any]:
@@ -195,15 +191,6 @@ def _whitened(gp: GP, cross: Any) -> Any:
     return cross @ gp.whitener.mT
 
 
-def predict_points(gp: GP, u: Any) -> tuple[np.ndarray, np.ndarray]:
-    """`predict` of a user's points.
-
-    Raises:
-        ValueError: u is of another shape.
-    """
-    return predict(gp, checked_points(u, gp.data.u.shape[1]))
-
-
 def predict_joint(gp: GP, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Posterior covariance [k, m, q] of the latent functions between u [m, d] and v [q, d]."""
     at_u, at_v = _whitened(gp, _cross(gp, u)[0]), _whitened(gp, _cross(gp, v)[0])
@@ -218,3 +205,9 @@ def leave_one_out(gp: GP) -> tuple[np.ndarray, np.ndarray]:
     """
     variance = 1.0 / np.sum(gp.whitener**2, axis=1)
     return gp.data.y - gp.weights * variance, variance
+
+
+def leave_one_out_errors(gp: GP, n: int) -> np.ndarray:
+    """Studentised errors [n, k] at the first n points; those after them are fantasised."""
+    mean, variance = leave_one_out(gp)
+    return ((gp.data.y - mean) / np.sqrt(variance)).T[:n]

@@ -1,8 +1,7 @@
 """Have the chains converged, and if not, what is wrong and what to do."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from enum import StrEnum
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +13,7 @@ DIVERGENT_SHARE = 0.01
 
 
 class ConvergenceStatus(StrEnum):
-    """What came of sampling; each text is what to do about it."""
+    """Outcome of sampling; each text says how to mend it."""
 
     CONVERGED = "converged"
     TOO_FEW_DRAWS = (
@@ -32,15 +31,6 @@ class ConvergenceStatus(StrEnum):
 
 class SamplingWarning(UserWarning):
     """The draws do not fulfil what the sampler promises; the message says which and why."""
-
-
-class Shortfall(NamedTuple):
-    """A measure that missed its limit."""
-
-    parameter: str
-    measure: str  # as in `diagnose`
-    value: float
-    limit: float
 
 
 MEASURES = {
@@ -81,41 +71,30 @@ def limits(chains: int, draws: int) -> tuple[float, float]:
     return max(RHAT_LIMIT, 1.0 + 6.0 / draws), chains * min(ESS_PER_CHAIN, draws / 10.0)
 
 
-def shortfalls(
-    measures: Mapping[str, Mapping[str, float]], chains: int, draws: int
-) -> list[Shortfall]:
-    """What of `measures` (parameter -> as from `diagnose`) misses its limit, NaN included."""
-    rhat, ess = limits(chains, draws)
-    found = []
-    for parameter, values in measures.items():
-        if not values["rhat"] <= rhat:
-            found.append(Shortfall(parameter, "rhat", values["rhat"], rhat))
-        for measure in ("ess_bulk", "ess_tail"):
-            if not values[measure] >= ess:
-                found.append(Shortfall(parameter, measure, values[measure], ess))
-    return found
+def shortfall(
+    measures: Mapping[str, Mapping[str, float]], chains: int, draws: int, steps: int
+) -> str:
+    """Measures beyond their limits, NaN included, where they are worst; "" if there are none.
 
-
-def describe(short: Sequence[Shortfall], steps: int) -> str:
-    """A sentence that says what is wrong where it is worst, by how much, and what to do."""
+    Args:
+        measures: Parameter -> as from `diagnose`.
+        chains, draws: Of those that were measured.
+        steps: Draws per chain that were made.
+    """
+    most, least = limits(chains, draws)
     parts = []
     for measure, meaning in MEASURES.items():
-        missed = [s for s in short if s.measure == measure]
+        values = {parameter: of[measure] for parameter, of in measures.items()}
+        if measure == "rhat":
+            missed = {name: value for name, value in values.items() if not value <= most}
+            worst, bound = max(missed, key=values.__getitem__, default=""), f"above {most:.3f}"
+        else:
+            missed = {name: value for name, value in values.items() if not value >= least}
+            worst, bound = min(missed, key=values.__getitem__, default=""), f"below {least:.0f}"
         if missed:
-            rank = max if measure == "rhat" else min
-            worst = rank(missed, key=lambda s: s.value)
-            bound, digits = ("above", ".3f") if measure == "rhat" else ("below", ".0f")
-            parts.append(
-                f"{meaning} of {worst.parameter!r} is {worst.value:{digits}}, "
-                f"{bound} {worst.limit:{digits}}"
-            )
+            digits = ".3f" if measure == "rhat" else ".0f"
+            parts.append(f"{meaning} of {worst!r} is {missed[worst]:{digits}}, {bound}")
+    if not parts:
+        return ""
     advice = ConvergenceStatus.TOO_FEW_DRAWS
     return f"not converged after {steps} draws per chain: {'; '.join(parts)}. {advice}"
-
-
-def describe_divergences(share: float) -> str:
-    """The same for a share of divergent transitions."""
-    return (
-        f"not converged: {share:.1%} of the transitions diverged, above {DIVERGENT_SHARE:.0%}. "
-        f"{ConvergenceStatus.DIVERGENT}"
-    )

@@ -6,14 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import quadrature
-from .convergence import (
-    DIVERGENT_SHARE,
-    ConvergenceStatus,
-    describe,
-    describe_divergences,
-    diagnose,
-    shortfalls,
-)
+from .convergence import DIVERGENT_SHARE, ConvergenceStatus, diagnose, shortfall
 from .ensemble import sample_emcee
 from .nuts import sample_nuts
 from .quadrature import sample_quadrature
@@ -62,16 +55,19 @@ def draw_posterior(
     while True:
         chains = thinned(parts)
         measures = {n: diagnose(chains.u[..., j]) for j, n in enumerate(names)}
-        short = shortfalls(measures, length.chains, length.draws)
+        steps = len(parts) * length.draws
+        short = shortfall(measures, length.chains, length.draws, steps)
         if not short or 2 * len(parts) > extend:
             break
         parts += [next(source) for _ in range(len(parts))]
-    steps = len(parts) * length.draws
-    found = {ConvergenceStatus.TOO_FEW_DRAWS: describe(short, steps)} if short else {}
+    found = {ConvergenceStatus.TOO_FEW_DRAWS: short} if short else {}
     flags = [part.stats["diverging"] for part in parts if "diverging" in part.stats]
     divergent = float(np.mean(flags)) if flags else 0.0
     if divergent > DIVERGENT_SHARE:
-        found[ConvergenceStatus.DIVERGENT] = describe_divergences(divergent)
+        found[ConvergenceStatus.DIVERGENT] = (
+            f"not converged: {divergent:.1%} of the transitions diverged, above "
+            f"{DIVERGENT_SHARE:.0%}. {ConvergenceStatus.DIVERGENT}"
+        )
     checks: dict[str, float] = {}
     if target.dimension in quadrature.FIRST_GRID and sampler != "quadrature":
         effective = min(min(m["ess_bulk"], m["ess_tail"]) for m in measures.values())

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import ndtr
 
-from .importance import explore
+from .importance import explore, resampled
 from .mixture import UNIFORMS, Mixture, propose
 from .mixture import log_density as log_mixture
-from .starts import resampled
 from .target import (
     LOG_ZERO,
     Chains,

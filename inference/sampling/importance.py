@@ -67,6 +67,13 @@ class Population(NamedTuple):
         return self.x[np.append(others, first)]
 
 
+def resampled(rng: np.random.Generator, found: Population, n: int) -> np.ndarray:
+    """n different points x [n, d], drawn by weight (Gumbel top-n): every mode of some weight
+    attracts some of them, wherever in the prior it lies."""
+    noisy = found.log_weights + rng.gumbel(size=len(found.x))
+    return found.x[np.argsort(-noisy)[:n]]
+
+
 def weighted_quantiles(
     values: np.ndarray, weights: np.ndarray, shares: Sequence[float]
 ) -> np.ndarray:

@@ -11,12 +11,12 @@ from numpyro.infer.hmc import HMCState, hmc
 from numpyro.infer.util import ParamInfo
 from scipy.special import ndtr, ndtri
 
+from ..gp.process import GP, padded
 from ..types import LogLikelihood
 from .compilation_cache import kept_compilations
-from .importance import explore
+from .importance import Population, explore, resampled
 from .mixture import UNIFORMS, Mixture, fit_mixture, propose
 from .mixture import log_density as log_mixture
-from .starts import local_factor, resampled, spread_factor
 from .target import Chains, Length, Target, log_density
 
 BLOCK = 250  # draws of one call of the compiled program, whatever number is asked for
@@ -24,6 +24,7 @@ FIRST_STEP = 0.7  # in whitened coordinates
 TARGET_ACCEPTANCE = 0.9  # share that the step size aims at; at 0.8 more than 1 % may diverge
 POOR_EFFECTIVE = 60.0  # effective points below which a population is mended by a first warm-up
 REFITTED_DRAWS = 512  # draws to which the mixture is fitted then
+SEPARATE_MODES_GAIN = 0.5  # in mean log density over one Gaussian: modes then count as separate
 
 XLA_OPTIONS = {"xla_cpu_use_fusion_emitters": False}
 STATISTICS = {
@@ -176,8 +177,7 @@ def _blocks(
 
     d = start.shape[1]
     seeds = rng.integers(2**31, size=len(start)).astype(np.uint32)
-    # padded, so that another number of simulations reuses the compiled program
-    state = target.state.padded() if hasattr(target.state, "padded") else target.state
+    state = padded_state(target.state)
     y = start @ whitener.T
 
     def block(starts: Sequence[np.ndarray | None]) -> Chains:
@@ -196,6 +196,17 @@ def _blocks(
         yield block([None] * len(start))
 
 
+def padded_state(state: Any) -> Any:
+    """The same likelihood in arrays of few shapes, so that another number of simulations reuses the
+    compiled program: its processes are padded, and what its own method `padded` pads."""
+
+    def process(part: object) -> bool:
+        return isinstance(part, GP)
+
+    state = state.padded() if hasattr(state, "padded") else state
+    return jax.tree.map(lambda one: padded(one) if process(one) else one, state, is_leaf=process)
+
+
 def _take(blocks: Iterator[Chains], count: int, left: list[Chains]) -> Chains:
     """The next `count` draws; what remains of the last block goes to `left`."""
     parts, have = left[:], sum(part.u.shape[1] for part in left)
@@ -205,6 +216,27 @@ def _take(blocks: Iterator[Chains], count: int, left: list[Chains]) -> Chains:
     whole = jax.tree.map(lambda *arrays: np.concatenate(arrays, axis=1), *parts)
     left[:] = [jax.tree.map(lambda array: array[:, count:], whole)]
     return jax.tree.map(lambda array: array[:, :count], whole)
+
+
+def spread_factor(found: Population) -> np.ndarray:
+    """Cholesky factor [d, d] of the covariance; of the modes' average one, where they are so
+    separate that one Gaussian describes the population far worse than the mixture."""
+    weights, x = found.weights, found.x
+    centred = x - weights @ x
+    covariance = centred.T @ (centred * weights[:, None])
+    factor = np.linalg.cholesky(covariance)
+    white = np.linalg.solve(factor, centred.T)
+    constant = np.log(np.diag(factor)).sum() + 0.5 * x.shape[1] * np.log(2.0 * np.pi)
+    gaussian = -0.5 * np.sum(white**2, axis=0) - constant
+    used = weights > 0.0
+    gain = weights[used] @ (found.log_proposal - gaussian)[used]
+    return factor if gain < SEPARATE_MODES_GAIN else local_factor(found)
+
+
+def local_factor(found: Population) -> np.ndarray:
+    """Cholesky factor of the components' average covariance."""
+    shares, factors = np.exp(found.mixture.log_share), found.mixture.factor
+    return np.linalg.cholesky(np.einsum("k,kij,klj->il", shares, factors, factors))
 
 
 def _mended(guide: Guide, x: np.ndarray) -> Guide:

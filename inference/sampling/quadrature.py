@@ -36,24 +36,6 @@ class Quadrature(NamedTuple):
     log_likelihood: np.ndarray  # [n], at the centres
     evaluations: int
 
-    @property
-    def centre(self) -> np.ndarray:
-        return self.low + 0.5 * self.width[:, None]
-
-    def mean(self) -> np.ndarray:
-        """Of u, [d]."""
-        return self.mass @ self.centre
-
-    def sd(self) -> np.ndarray:
-        """Of u, [d]."""
-        return np.sqrt(
-            self.mass @ ((self.centre - self.mean()) ** 2 + self.width[:, None] ** 2 / 12)
-        )
-
-    def marginal(self, j: int, edges: np.ndarray) -> np.ndarray:
-        """Posterior probability of u_j between consecutive edges [m + 1]: [m]."""
-        return np.diff(_cdf(self.low[:, j], self.width, self.mass, edges))
-
 
 class _Cells(NamedTuple):
     low: np.ndarray

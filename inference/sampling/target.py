@@ -26,7 +26,7 @@ class Target(NamedTuple):
 
 
 class Length(NamedTuple):
-    """How long to sample."""
+    """Chains and their lengths."""
 
     chains: int
     warmup: int
@@ -34,7 +34,7 @@ class Length(NamedTuple):
 
 
 class Chains(NamedTuple):
-    """What a sampler yields."""
+    """Draws of a sampler."""
 
     u: np.ndarray  # [chain, draw, d], prior quantiles
     stats: dict[str, np.ndarray]  # name -> [chain, draw]

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple, Protocol
 import jax
 import numpy as np
 
+from .._float64 import in_float64
 from ..gp.process import GP
 from ..prior import Prior
 from ..simulations.failures import Failure
@@ -31,7 +32,7 @@ class Measured(NamedTuple):
 
 
 class Surrogate(Protocol):
-    """What was learned from the simulations, over prior quantiles u in [0, 1]^d."""
+    """A likelihood learned from simulations, over prior quantiles u in [0, 1]^d."""
 
     @property
     def gp(self) -> GP:
@@ -41,8 +42,7 @@ class Surrogate(Protocol):
     @property
     def state(self) -> Any:
         """NamedTuple of NumPy arrays on which the likelihood depends, `gp` among them; data, never
-        a closure. Its method `padded` gives the same likelihood in arrays of few shapes: NUTS is
-        compiled for each."""
+        a closure. NUTS is compiled for each set of shapes, see `nuts.padded_state`."""
         ...
 
     @property
@@ -80,15 +80,15 @@ class Surrogate(Protocol):
         ...
 
     def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
-        """What `predict` predicts, of n finished runs [n, ...]."""
+        """The quantity of `predict`, for n finished runs [n, ...]."""
         ...
 
     def constants(self) -> dict[str, np.ndarray]:
-        """What a reader of the posterior must know of the likelihood."""
+        """Constants of the likelihood, kept with the posterior."""
         ...
 
     def described(self) -> list[str]:
-        """What a reader of the fit should know first, in a few words."""
+        """The most important constants, in a few words."""
         ...
 
     def checks(self) -> dict[str, np.ndarray]:
@@ -102,7 +102,7 @@ class Surrogate(Protocol):
         ...
 
     def warnings(self, *, confirmed: bool = False) -> list[str]:
-        """What is complained of, in sentences.
+        """Warnings, in sentences.
 
         Args:
             confirmed: Runs at draws of the posterior left it where it was: then errors of the
@@ -144,6 +144,7 @@ class SurrogateView:
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.prior}, {type(self.learned).__name__})"
 
+    @in_float64
     def predict(self, theta: Theta) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new simulation at theta, each [..., *its own axes].
 
@@ -155,8 +156,9 @@ class SurrogateView:
         return _shaped(mean, u.shape[:-1]), _shaped(sd, u.shape[:-1])
 
     @property
+    @in_float64
     def warnings(self) -> list[str]:
-        """What the surrogate's own checks complain of, in sentences."""
+        """Warnings of the surrogate's own checks, in sentences."""
         return self.learned.warnings()
 
 

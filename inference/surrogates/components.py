@@ -37,7 +37,7 @@ class Basis(NamedTuple):
         return self.standardise(outputs) @ self.vectors / np.where(squared > 0, squared, 1.0)
 
     def residuals(self, outputs: np.ndarray) -> np.ndarray:
-        """What the components leave of the standardised outputs, [n, m]."""
+        """Standardised outputs less their components, [n, m]."""
         return self.standardise(outputs) - self.scores(outputs) @ self.vectors.T
 
 

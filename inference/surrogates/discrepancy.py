@@ -5,20 +5,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._float64 import in_float64
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
-from ..gp.optimise import minimise_in_box
+from ..gp.optimise import surely_least
 from ..gp.process import (
     GP,
     Data,
     condition,
     fantasize,
     leave_one_out,
+    leave_one_out_errors,
     predict,
-    predict_points,
 )
-from ..types import LogLikelihood, LogSecondMoment
-from .outliers import is_outlier
 from .threshold import (
     Matched,
     Threshold,
@@ -40,6 +37,8 @@ BETWEEN = 0.25  # of the least simulated discrepancy: the least that is taken fo
 MIN_RESOLUTION = 1e-4  # of the spread of g(Delta)
 UNKNOWN_FREEDOM = 20.0  # errors more than parameters, where nothing tells their number
 LOW = 3.0  # sds of a new discrepancy by which a threshold lies too low
+BEST_SHARE = 0.25  # of the runs, which tell how far discrepancies spread
+MAX_DEVIATIONS = 1e9  # of that spread, beyond which a discrepancy is absurd
 TRANSFORM_GROWTH = 1.3  # the transform is chosen anew when data have grown by this factor
 
 
@@ -86,6 +85,9 @@ class DiscrepancySurrogate:
     resolution: float = np.inf
     said: tuple[str, ...] = ()
 
+    log_likelihood = staticmethod(log_likelihood)
+    log_second_moment = staticmethod(log_second_moment)
+
     @property
     def equal(self) -> bool:
         """Whether all discrepancies are the same, but for rounding."""
@@ -96,7 +98,6 @@ class DiscrepancySurrogate:
         return self.scale.transform
 
     @property
-    @in_float64
     def state(self) -> ThresholdState:
         threshold = (self.threshold - self.scale.location) / self.scale.spread
         width, resolution = (
@@ -105,7 +106,6 @@ class DiscrepancySurrogate:
         return ThresholdState(self.gp, np.asarray(threshold), width, resolution, self.success)
 
     @property
-    @in_float64
     def cautious(self) -> "DiscrepancySurrogate":
         """The surrogate to which doubt beyond what the threshold can resolve is no agreement."""
         mean, _ = self.predict(self.gp.data.u)
@@ -117,18 +117,9 @@ class DiscrepancySurrogate:
     def sure(self) -> ThresholdState:
         return self.state._replace(doubt=np.zeros(()))
 
-    @property
-    def log_likelihood(self) -> LogLikelihood:
-        return log_likelihood
-
-    @property
-    def log_second_moment(self) -> LogSecondMoment:
-        return log_second_moment
-
-    @in_float64
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new g(Delta), its noise included, at quantiles u [n, d]: [n], [n]."""
-        (mean,), (variance,) = predict_points(self.gp, u)
+        (mean,), (variance,) = predict(self.gp, u)
         sd = np.sqrt(variance + np.exp(2.0 * self.gp.hyper.log_noise[0]))
         return self.scale.location + self.scale.spread * mean, self.scale.spread * sd
 
@@ -136,38 +127,25 @@ class DiscrepancySurrogate:
         """g(Delta) [n], capped at the worst run that was learned from."""
         return self.transform(np.minimum(discrepancy, self.discrepancy.max()))
 
-    @in_float64
     def minimum(self) -> np.ndarray:
-        """Where the mean is surely low: minimiser of mean + sd over the box, u [d].
+        """Where the discrepancy is surely low, u [d]."""
+        return surely_least(self.gp)
 
-        The mean alone may be least in a corner where nothing was simulated.
-        """
-
-        def surely(u: np.ndarray) -> np.ndarray:
-            (mean,), (variance,) = predict(self.gp, u)
-            return mean + np.sqrt(variance)
-
-        return minimise_in_box(surely, self.gp.data.u.shape[1])
-
-    @in_float64
     def fantasize(self, u: np.ndarray) -> "DiscrepancySurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
         return replace(self, gp=fantasize(self.gp, u)) if len(u) else self
 
     def constants(self) -> dict[str, np.ndarray]:
-        """What a reader of the posterior must know of the likelihood."""
+        """The threshold, on the scale of g(Delta)."""
         return {"threshold": np.asarray(self.threshold)}
 
     def described(self) -> list[str]:
         """The threshold, on the scale of the discrepancy."""
         return [f"threshold {float(self.transform.inverse(np.asarray(self.threshold))):.3g}"]
 
-    @in_float64
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, 1]."""
-        mean, variance = leave_one_out(self.gp)
-        error = (self.gp.data.y - mean) / np.sqrt(variance)
-        return {"loo_z": error[0, : len(self.discrepancy), None]}
+        return {"loo_z": leave_one_out_errors(self.gp, len(self.discrepancy))}
 
     @property
     def fits(self) -> bool:
@@ -176,9 +154,8 @@ class DiscrepancySurrogate:
         low = LOW * np.hypot(sd, self.width)
         return self.equal or bool((self.threshold > mean - low).any())
 
-    @in_float64
     def warnings(self, *, confirmed: bool = False) -> list[str]:
-        """What the process's errors complain of, unless it is confirmed, and what was compared."""
+        """Warnings of the process's errors, unless it is confirmed, and of what was compared."""
         if self.equal:
             return [EQUAL]
         said = [*self.said]
@@ -188,7 +165,6 @@ class DiscrepancySurrogate:
             said.append(NOISY)
         return said if self.fits else [*said, LOW_THRESHOLD]
 
-    @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
         """One new discrepancy for each row of u [n, d]."""
         mean, sd = self.predict(u)
@@ -196,7 +172,6 @@ class DiscrepancySurrogate:
         return {"discrepancy": self.transform.inverse(drawn)}
 
 
-@in_float64
 def learn(
     u: np.ndarray,
     discrepancy: np.ndarray,
@@ -248,11 +223,19 @@ def learn(
     return with_threshold(chosen, None)
 
 
+def is_outlier(discrepancy: np.ndarray) -> np.ndarray:
+    """Which of the discrepancies [n] are absurdly larger than the best quarter, bool [n]; NaN is
+    not. Most runs may have blown up, or hold a number such as 1e16 in place of infinity."""
+    deviation = discrepancy - np.nanmin(discrepancy, initial=np.inf)
+    finite = deviation[np.isfinite(deviation)]
+    spread = np.quantile(finite, BEST_SHARE) if finite.size else 0.0
+    return (deviation / MAX_DEVIATIONS > spread) & (spread != 0.0)
+
+
 def _fit(data: Data) -> GP:
     return condition(maximum_a_posteriori(data), data)
 
 
-@in_float64
 def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> DiscrepancySurrogate:
     """The surrogate with the threshold that a rule chooses, see `threshold.choose_threshold`.
 

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._float64 import in_float64
 from .._lazy import stats
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.process import (
@@ -14,9 +13,9 @@ from ..gp.process import (
     Hyper,
     condition,
     leave_one_out,
+    leave_one_out_errors,
 )
-from ..gp.process import predict_points as predict_scores
-from .component_noise import absorbed_noise, left_over
+from ..gp.process import predict as predict_scores
 from .components import Basis, principal_components
 from .measurement_noise import MIN_SIZE, Remainder, shrunk_covariance
 from .noise.run_size import EQUAL_RUNS_TOLERANCE, Size, learn_size, run_spread
@@ -29,11 +28,12 @@ PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
 MIN_NOISE_SHARE = 0.01  # share of noise in the outputs' variance from which its size may vary
 SIZE_ROUNDS = 2  # of learning sizes from errors, and the emulator with these sizes
 TOO_SMALL = 0.01  # probability that repeated runs differ by less than they may
+MAX_ABSORBED_SHARE = 0.9  # of a score that may count as its own run's noise
 LEAST_OF_ERROR = 0.05  # of an expected squared error, added before its logarithm is taken
 
 
 class EmulatorLimits(NamedTuple):
-    """How much an emulator may hold.
+    """Limits of an emulator.
 
     Attributes:
         components: At most.
@@ -48,7 +48,7 @@ class EmulatorLimits(NamedTuple):
 
 
 class Emulator(NamedTuple):
-    """What simulations teach of the output, whatever was observed.
+    """Emulator of the simulator's output, whatever was observed.
 
     Attributes:
         gp: One process for each of k scores; the empty ones are flat.
@@ -86,7 +86,6 @@ class Emulator(NamedTuple):
         return (differ > EQUAL_RUNS_TOLERANCE * self.outputs.std(0)).any(1)
 
 
-@in_float64
 def emulate(
     u: np.ndarray,
     outputs: np.ndarray,
@@ -128,7 +127,9 @@ def _learned(
     share = max(EXPLAINED_SHARE, 1.0 - limits.left / varied) if varied else EXPLAINED_SHARE
     components = principal_components(outputs, units, limits.components, share, spread)
     data = known._replace(y=components.scores(outputs).T, spread=spread)
-    basis, hyper = _taught(components, data, limits.predicted)
+    basis, hyper = components, maximum_a_posteriori(data)
+    if limits.predicted is not None:
+        basis, hyper = _predicted(basis, hyper, data, limits.predicted)
     remainder = _left(basis, outputs, spread)
     excess = absorbed_noise(basis, np.exp(2.0 * hyper.log_noise), remainder, n)
     smaller = np.log1p(-excess)
@@ -139,7 +140,7 @@ def _learned(
 
 
 def _left(basis: Basis, outputs: np.ndarray, spread: np.ndarray | None) -> Remainder:
-    """What the components leave of outputs [n, m], for noise of the size 1."""
+    """Covariance of outputs [n, m] less their components, for noise of the size 1."""
     residuals = basis.residuals(outputs)
     if spread is not None:  # scaled to one length: unlike sizes would look like correlation
         length = np.linalg.norm(residuals, axis=1)
@@ -155,7 +156,6 @@ def _with_noise(emulator: Emulator, gp: GP, remainder: Remainder) -> Emulator:
     return emulator._replace(gp=gp, remainder=remainder, noise=noise)
 
 
-@in_float64
 def resized(emulator: Emulator, scale: Callable[[np.ndarray], np.ndarray]) -> Emulator:
     """The same with run-to-run noise whose size depends on the parameters, if errors show that.
 
@@ -189,12 +189,6 @@ def _log_sizes(emulator: Emulator) -> np.ndarray:
     residuals = basis.residuals(emulator.outputs)
     found = squared @ (gp.data.y - mean) ** 2 + np.sum(residuals**2, 1)
     return 0.5 * np.log(spread * (found / due + LEAST_OF_ERROR))
-
-
-def _taught(basis: Basis, data: Data, predicted: float | None) -> tuple[Basis, Hyper]:
-    """Components that the parameters predict, and the hyperparameters of their scores."""
-    hyper = maximum_a_posteriori(data)
-    return (basis, hyper) if predicted is None else _predicted(basis, hyper, data, predicted)
 
 
 def _predicted(basis: Basis, hyper: Hyper, data: Data, least: float) -> tuple[Basis, Hyper]:
@@ -257,11 +251,42 @@ def run_to_run(gp: GP, basis: Basis, white: float, n: int) -> np.ndarray:
     return correlation * np.outer(sd, sd)
 
 
+def absorbed_noise(basis: Basis, noise: np.ndarray, remainder: Remainder, n: int) -> np.ndarray:
+    """Share [k] of the scores of n runs that is these runs' own noise.
+
+    A principal component leans towards the noise of the runs that it is computed from, so their
+    scores contain that noise and a new run's do not: to first order by the noise's variance
+    across the component over n times the component's variance (Nadler 2008, finite sample
+    perturbation of principal components). Without a correction the emulator is too steep by that
+    share, most of all in the weak components of few, long and noisy outputs.
+
+    Args:
+        noise: Run-to-run variances of the scores [k].
+        remainder: What the components leave.
+    """
+    squared = np.sum(basis.vectors**2, 0)
+    total = np.sum(noise * squared) + remainder.total
+    across = np.maximum(total - noise * squared, 0.0)
+    share = np.where(squared > 0.0, across / (n * np.where(squared > 0.0, squared, 1.0)), 0.0)
+    return np.minimum(share, MAX_ABSORBED_SHARE)
+
+
+def left_over(
+    basis: Basis, noise: np.ndarray, remainder: Remainder, excess: np.ndarray
+) -> Remainder:
+    """`remainder`, plus the noise wrongly attributed to the components.
+
+    Args:
+        noise: Run-to-run variances of the scores, without the excess [k].
+    """
+    taken = np.sum(noise * ((1.0 - excess) ** -2 - 1.0) * np.sum(basis.vectors**2, 0))
+    return remainder._replace(white=remainder.white + float(taken) / len(basis.vectors))
+
+
 def loo_errors(emulator: Emulator) -> np.ndarray:
     """Studentised leave-one-out errors of the scores [n, used], of what was simulated."""
     gp = emulator.gp.only(slice(emulator.basis.used))
-    mean, variance = leave_one_out(gp)
-    return ((gp.data.y - mean) / np.sqrt(variance)).T[: len(emulator.outputs)]
+    return leave_one_out_errors(gp, len(emulator.outputs))
 
 
 def noise_share(emulator: Emulator) -> float:
@@ -308,15 +333,13 @@ def smallest_misfit(emulator: Emulator, observed: np.ndarray, u: np.ndarray) -> 
     return float(max(np.sqrt(total / len(observed)), MIN_SIZE))
 
 
-@in_float64
 def mean(emulator: Emulator, u: np.ndarray) -> np.ndarray:
     """Mean of the outputs at u [n, d]: [n, m]."""
     return _outputs(emulator.basis, predict_scores(emulator.gp, u)[0])
 
 
-@in_float64
 def left_out(emulator: Emulator) -> np.ndarray:
-    """What all other runs predict of each run, components and hyperparameters kept: [n, m]."""
+    """Leave-one-out predictions, components and hyperparameters kept: [n, m]."""
     return _outputs(emulator.basis, leave_one_out(emulator.gp)[0])
 
 

@@ -15,7 +15,7 @@ from .base import Measured, Surrogate, TrainingData
 from .discrepancy import DiscrepancySurrogate, learn, with_threshold
 from .emulator import PREDICTED_SHARE, Emulator, EmulatorLimits, emulate, goes_on, resized
 from .given_noise import Covariance, NoiseModel, check_noise, given_noise
-from .log_likelihood import LogLikelihoodFamily, LogLikelihoodLearner
+from .log_likelihood import LogLikelihoodFamily
 from .noise.by_mean import ByMean, SdOfMean, law_of
 from .noise.scales import OutputScale, Plain, comparable
 from .output_vectors import Output, Summary, describe, infinities, summarise
@@ -23,7 +23,7 @@ from .signal import MIN_FREEDOM, SignalSurrogate, observe
 from .squared_difference import evaluate, failed_on, independent, numbers, squared_difference
 from .success import learn_success
 from .threshold import Matched, Threshold, check_rule
-from .transform import TRANSFORMS
+from .transform import check_transform
 from .warnings import GUESSED, NEGATIVE, distance_warnings
 
 MAX_COMPONENTS = 8
@@ -56,10 +56,7 @@ class DiscrepancyFamily:
     def __post_init__(self) -> None:
         check_rule(self.threshold)
         check_callable("discrepancy", self.discrepancy)
-        if self.transform is not None and self.transform not in tuple(TRANSFORMS):
-            raise ValueError(
-                f"transform must be one of {tuple(TRANSFORMS)} or None, got {self.transform!r}"
-            )
+        check_transform(self.transform)
 
     def learner(self, observed: np.ndarray) -> "DiscrepancyLearner":
         return DiscrepancyLearner(self, _distance(self.discrepancy, observed), observed)
@@ -72,10 +69,6 @@ class DiscrepancyLearner:
     family: DiscrepancyFamily
     distance: Discrepancy
     observed: np.ndarray
-
-    @property
-    def features(self) -> int:
-        return self.observed.size
 
     @property
     def any_shape(self) -> bool:
@@ -211,10 +204,6 @@ class SignalLearner:
     scale: OutputScale
 
     @property
-    def features(self) -> int:
-        return len(self.values)
-
-    @property
     def any_shape(self) -> bool:
         """Whether signals may have another shape than what was observed."""
         return self.family.summary is not None
@@ -290,7 +279,6 @@ class SignalLearner:
 
 
 Family = DiscrepancyFamily | SignalFamily | LogLikelihoodFamily
-Learner = DiscrepancyLearner | SignalLearner | LogLikelihoodLearner
 FAMILIES: dict[str, type[Family]] = {
     family.name: family for family in (DiscrepancyFamily, SignalFamily, LogLikelihoodFamily)
 }
@@ -334,7 +322,7 @@ def resolve(surrogate: str | Family | None, options: dict) -> Family:
 
 
 def checked_observed(observed: ArrayLike | None, family: Family) -> np.ndarray:
-    """What was observed; NaN where the simulator returns the likelihood.
+    """The observed output; NaN where the simulator returns the likelihood.
 
     Raises:
         ValueError: something was observed but shall not, or shall but was not, or is infinite.

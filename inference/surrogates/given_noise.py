@@ -42,7 +42,7 @@ class GivenNoise(NamedTuple):
 
 
 class NoiseModel(NamedTuple):
-    """What is known of the noise between the simulator and the data.
+    """The noise between the simulator and the data.
 
     Attributes:
         given: The measurement noise; None where it is unknown.
@@ -75,8 +75,6 @@ def given_noise(noise: ArrayLike | Covariance, output: Output) -> GivenNoise:
     if isinstance(noise, Covariance):
         return _covariance(_at_samples(noise, output), output)
     given = checked_array("noise", noise)
-    # from the order of the observed output to that of the values
-    rank = np.argsort(np.argsort(output.present))
     if given.shape == (samples, samples) == output.shape:
         raise ValueError(
             f"noise of shape {given.shape} may be sds or a covariance; give sds as [{samples}]"
@@ -88,7 +86,7 @@ def given_noise(noise: ArrayLike | Covariance, output: Output) -> GivenNoise:
     elif given.shape == output.shape:
         sds = given.ravel()[output.present]
     elif given.shape == (samples,):
-        sds = given[rank]
+        sds = given[output.rank]
     else:
         raise ValueError(
             f"noise must be a number, sds of shape {output.shape} as observed or [{samples}], or a "

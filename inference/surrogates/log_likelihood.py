@@ -7,27 +7,23 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from .._float64 import in_float64
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.namespaces import namespace
-from ..gp.optimise import minimise_in_box
+from ..gp.optimise import surely_least
 from ..gp.process import (
     GP,
     Data,
     condition,
     fantasize,
     leave_one_out,
-    padded,
-    padded_rows,
+    leave_one_out_errors,
     predict,
-    predict_points,
 )
 from ..sampling.importance import explore
 from ..sampling.target import Target
 from ..simulations.failures import Failure, impossible, incomparable, not_finite
-from ..types import LogLikelihood, LogSecondMoment
 from .base import Measured, TrainingData
-from .success import learn_success, log_success, padded_success
+from .success import learn_success, log_success
 from .warnings import EQUAL, UNCERTAIN, complaints
 
 NEAR = 40.0  # nats below the best, down to which a log likelihood must be right
@@ -62,7 +58,7 @@ class LogLikelihoodScale(NamedTuple):
         return self.top - expanded(self.location + self.spread * latent, self.linear)
 
     def folds(self, values: np.ndarray) -> np.ndarray:
-        """By how much nats at these log likelihoods are compressed, 1 near the top."""
+        """Factors by which nats at these log likelihoods are compressed, 1 near the top."""
         return np.maximum((self.top - values) / self.linear, 1.0)
 
 
@@ -79,7 +75,7 @@ def expanded(height: Any, linear: float | np.ndarray) -> Any:
 
 
 class LevelState(NamedTuple):
-    """What the likelihood depends on.
+    """Arrays on which the likelihood depends.
 
     A fit takes the harmonic mean of what the likelihood may be, a search the bound that lies
     `optimism` sds above its median.
@@ -91,13 +87,6 @@ class LevelState(NamedTuple):
     doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts against a place
     optimism: np.ndarray = np.zeros(())
     rise: np.ndarray = np.full((), MAX_RISE)  # nats above the best value that count at most
-
-    def padded(self) -> "LevelState":
-        """The same likelihood in arrays of few shapes."""
-        success = padded_success(self.success)
-        return self._replace(
-            gp=padded(self.gp, 1, padded_rows(len(self.gp.data.u))), success=success
-        )
 
 
 def log_likelihood(state: LevelState, u: Any) -> Any:
@@ -152,6 +141,9 @@ class LogLikelihoodSurrogate:
     values: np.ndarray
     learned_at: int
 
+    log_likelihood = staticmethod(log_likelihood)
+    log_second_moment = staticmethod(log_second_moment)
+
     @property
     def gp(self) -> GP:
         return self.state.gp
@@ -175,25 +167,10 @@ class LogLikelihoodSurrogate:
     def sure(self) -> LevelState:
         return self.state._replace(doubt=np.zeros(()))
 
-    @property
-    def log_likelihood(self) -> LogLikelihood:
-        return log_likelihood
-
-    @property
-    def log_second_moment(self) -> LogSecondMoment:
-        return log_second_moment
-
-    @in_float64
     def minimum(self) -> np.ndarray:
-        """Where the log likelihood is surely high: greatest mean less sd, u [d]."""
+        """Where the log likelihood is surely high, u [d]."""
+        return surely_least(self.gp)
 
-        def surely(u: np.ndarray) -> np.ndarray:
-            mean, variance = predict(self.gp, u)
-            return mean[0] + np.sqrt(variance[0])
-
-        return minimise_in_box(surely, self.gp.data.u.shape[1])
-
-    @in_float64
     def fantasize(self, u: np.ndarray) -> "LogLikelihoodSurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
         if not len(u):
@@ -202,10 +179,9 @@ class LogLikelihoodSurrogate:
         usual = None if noise is None else np.full(len(u), np.median(noise))
         return replace(self, state=self.state._replace(gp=fantasize(self.gp, u, usual)))
 
-    @in_float64
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new log likelihood, its noise included, at u [n, d]: [n], [n]."""
-        mean, variance = predict_points(self.gp, u)
+        mean, variance = predict(self.gp, u)
         sd = np.sqrt(variance[0] + np.exp(2.0 * self.gp.hyper.log_noise[0]))
         scale, values = self.state.scale, self.state.scale.values(mean[0])
         return values, scale.spread * scale.folds(values) * sd
@@ -223,21 +199,17 @@ class LogLikelihoodSurrogate:
         """The noise of a log likelihood near the best one."""
         return [f"noise {float(self.constants()['noise']):.2g} nats"]
 
-    @in_float64
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, 1] of the compressed depths."""
-        mean, variance = leave_one_out(self.gp)
-        error = (self.gp.data.y - mean) / np.sqrt(variance)
-        return {"loo_z": error[0, : len(self.values), None]}
+        return {"loo_z": leave_one_out_errors(self.gp, len(self.values))}
 
     @property
     def fits(self) -> bool:
         """Always: no data are compared here."""
         return True
 
-    @in_float64
     def warnings(self, *, confirmed: bool = False) -> list[str]:
-        """What the leave-one-out errors complain of, of depths that count, unless confirmed; and
+        """Warnings of the leave-one-out errors at depths that count, unless confirmed; and
         that much of what may be the posterior lies where the log likelihood is hardly known."""
         if np.ptp(self.values) <= 1e-12 * np.abs(self.values).max():
             return [EQUAL]
@@ -256,14 +228,12 @@ class LogLikelihoodSurrogate:
         extrapolated = scale.values(mean) > scale.top + MAX_RISE
         return float(population.weights @ (unknown | extrapolated))
 
-    @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
         """One new log likelihood for each row of u [n, d]."""
         mean, sd = self.predict(u)
         return {"log_likelihood": mean + sd * rng.normal(size=mean.shape)}
 
 
-@in_float64
 def learn(
     u: np.ndarray,
     values: np.ndarray,
@@ -346,20 +316,15 @@ class LogLikelihoodFamily:
     name: ClassVar[str] = "log_likelihood"
     acquisition: ClassVar[str] = "draws"
     replicates: ClassVar[bool] = False
-
-    def learner(self, observed: np.ndarray) -> "LogLikelihoodLearner":
-        return LogLikelihoodLearner()
-
-
-@dataclass(frozen=True)
-class LogLikelihoodLearner:
-    """Log likelihoods are learned from as they are; the discrepancy is minus one."""
-
-    features: ClassVar[int] = 1  # the sd of the noise, NaN where none is given
     any_shape: ClassVar[bool] = True
 
+    def learner(self, observed: np.ndarray) -> "LogLikelihoodFamily":
+        """Itself: log likelihoods are learned from as they are; the discrepancy is minus one."""
+        return self
+
     def measure(self, signals: Sequence[np.ndarray | None]) -> Measured:
-        """Sds [n, 1] and minus the log likelihoods of n signals, None where a run failed."""
+        """Sds of the noise [n, 1], NaN where none is given, and minus the log likelihoods of n
+        signals, None where a run failed."""
         found = np.full((len(signals), 2), np.nan)
         errors: list[Failure | None] = [None] * len(signals)
         for i, signal in enumerate(signals):

@@ -36,7 +36,7 @@ class Remainder(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """Where the m values lie: in channel `channel`, at `sample`; sorted by both."""
+    """Positions of the m values: in channel `channel`, at `sample`; sorted by both."""
 
     channel: np.ndarray  # int [m]
     sample: np.ndarray  # int [m]
@@ -53,7 +53,7 @@ NO_MEASUREMENT_NOISE = Nodes(np.zeros(1), np.zeros(1))
 
 
 class Reduced(NamedTuple):
-    """What an observed output says of the k scores at each of g nodes.
+    """Estimates of the k observed scores at each of g nodes.
 
     Up to a factor that no score enters, the likelihood is N(estimate; scores, covariance).
     """

@@ -17,7 +17,7 @@ Summary = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class Output:
-    """How an output [*signal_shape] becomes values [m], channel after channel, time inside.
+    """Map from an output [*signal_shape] to values [m], channel after channel, time inside.
 
     Attributes:
         summary: The user's function of one output, or None.
@@ -65,9 +65,14 @@ class Output:
         sums = np.add.reduceat(samples, self.starts, axis=0)
         return sums / self.counts.reshape(-1, *[1] * (samples.ndim - 1))
 
+    @property
+    def rank(self) -> np.ndarray:
+        """Place in the flattened order of each sample, in the order of the values [samples]."""
+        return np.argsort(np.argsort(self.present))
+
     def average_covariance(self, covariance: np.ndarray) -> np.ndarray:
         """Of samples in the flattened order [len(present), len(present)] -> of values [m, m]."""
-        rank = np.argsort(np.argsort(self.present))
+        rank = self.rank
         return self.average(self.average(covariance[np.ix_(rank, rank)]).T)
 
     def restore(self, values: np.ndarray) -> np.ndarray:
@@ -77,7 +82,7 @@ class Output:
         return full.reshape(len(values), *self.shape)
 
     def scale(self, values: np.ndarray) -> np.ndarray:
-        """What makes values [n, m] comparable, [m]: the sd of a series' channel, or of a value."""
+        """Scales of values [n, m], [m]: the sd of a series' channel, or of a value."""
         variance = (values - values[0]).var(0)
         rounding = 1e-12 * np.abs(values).max(0)
         variance = np.where(variance > rounding**2, variance, 0.0)
@@ -96,13 +101,13 @@ def summarise(summary: Summary | None, output: np.ndarray) -> np.ndarray:
 
 
 def infinities(values: np.ndarray) -> str:
-    """What in an array is not finite, such as "-inf in 3 of 60 values"."""
+    """Counts of values that are not finite, such as "-inf in 3 of 60 values"."""
     found = zip(*np.unique(values[~np.isfinite(values)], return_counts=True), strict=True)
     return f"{', '.join(f'{value} in {n}' for value, n in found)} of {values.size} values"
 
 
 def describe(observed: np.ndarray, summary: Summary | None) -> Output:
-    """How outputs like `observed` become values; NaN is a missing sample.
+    """The map from outputs like `observed` to values; NaN is a missing sample.
 
     Raises:
         ValueError: nothing is finite, or something infinite.

@@ -5,12 +5,10 @@ from functools import cached_property
 
 import numpy as np
 
-from .._float64 import in_float64
 from .._lazy import stats
 from ..gp.optimise import minimise_in_box
 from ..gp.process import GP, fantasize
 from ..sobol import sobol
-from ..types import LogLikelihood, LogSecondMoment
 from .emulator import (
     Emulator,
     borne_out,
@@ -106,6 +104,9 @@ class SignalSurrogate:
     success: GP | None = None
     scale: OutputScale = Plain(np.zeros(0), None)
 
+    log_likelihood = staticmethod(log_likelihood)
+    log_second_moment = staticmethod(log_second_moment)
+
     @property
     def gp(self) -> GP:
         return self.emulator.gp
@@ -116,12 +117,10 @@ class SignalSurrogate:
         return self
 
     @cached_property
-    @in_float64
     def state(self) -> SignalState:
         return state_of(self.emulator, self.reduced, self.box)._replace(success=self.success)
 
     @property
-    @in_float64
     def sure(self) -> SignalState:
         """The state, were the simulator the emulator's mean. What looks like run-to-run noise, but
         repeated runs do not bear out, is doubt, too."""
@@ -136,21 +135,11 @@ class SignalSurrogate:
             found = replace(found, box=self.box, success=self.success)
         return found.state._replace(doubt=np.zeros(()))
 
-    @property
-    def log_likelihood(self) -> LogLikelihood:
-        return log_likelihood
-
-    @property
-    def log_second_moment(self) -> LogSecondMoment:
-        return log_second_moment
-
-    @in_float64
     def minimum(self) -> np.ndarray:
         """Maximiser of the likelihood over the box, u [d]."""
         state = self.state
         return minimise_in_box(lambda u: -log_likelihood(state, u), len(state.low), *self.box or ())
 
-    @in_float64
     def fantasize(self, u: np.ndarray) -> "SignalSurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
         if len(u) == 0:
@@ -159,7 +148,6 @@ class SignalSurrogate:
         return replace(self, emulator=self.emulator._replace(gp=fantasized))
 
     @property
-    @in_float64
     def node_weights(self) -> np.ndarray:
         """Posterior weights of the nodes, given the best parameters."""
         log_weights = node_log_densities(self.state, self.minimum()[None])[0]
@@ -168,7 +156,7 @@ class SignalSurrogate:
 
     @property
     def best_features(self) -> np.ndarray:
-        """What is predicted at the best parameters, on the emulator's scale [m]."""
+        """Predicted features at the best parameters, on the emulator's scale [m]."""
         return predict(self.emulator, self.minimum()[None])[0][0]
 
     @property
@@ -176,9 +164,8 @@ class SignalSurrogate:
         """Posterior probability of a misfit beside noise that is given."""
         return float(self.node_weights[self.nodes.sigma > 0.0].sum())
 
-    @in_float64
     def constants(self) -> dict[str, np.ndarray]:
-        """What a reader of the posterior must know of the likelihood."""
+        """Components, variances and noise."""
         weights = self.node_weights
         needed = self.known is None or self._missed()
         misfit = needed * np.sqrt(weights @ self.nodes.sigma**2) * self.emulator.basis.scale
@@ -199,7 +186,6 @@ class SignalSurrogate:
         how = "estimated" if self.known is None else "given" + self._missed() * ", and a misfit"
         return [f"measurement noise of sd {noise:.3g} in the first value, {how}"]
 
-    @in_float64
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new simulated output's values at u [n, d]: [n, m], [n, m].
 
@@ -212,7 +198,6 @@ class SignalSurrogate:
         """The outputs' values [n, m]."""
         return features
 
-    @in_float64
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, components in use]."""
         return {"loo_z": loo_errors(self.emulator)}
@@ -224,10 +209,8 @@ class SignalSurrogate:
             return True
         return not (self._missed() or self._smooth() or self._outside())
 
-    @in_float64
     def warnings(self, *, confirmed: bool = False) -> list[str]:
-        """What the emulator's own checks complain of, unless it is confirmed, and what the data
-        show."""
+        """Warnings of the emulator's own checks, unless it is confirmed, and of the data."""
         repeats, sized = self.emulator.repeats, self.emulator.size is not None
         if self.emulator.basis.used == 0 and not sized:
             if self.emulator.equal:
@@ -293,7 +276,6 @@ class SignalSurrogate:
         given, slow = self.known is not None, self.nodes.rho > SLOW
         return self._missed() if given else bool(self.node_weights @ slow >= 0.5)
 
-    @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
         """One new observation, measurement noise included, for each row of u [n, d]: [n, ...].
 
@@ -309,7 +291,6 @@ class SignalSurrogate:
         return {"signal": self.output.restore(self.scale.observe(rng, values))}
 
 
-@in_float64
 def observe(
     emulator: Emulator,
     output: Output,

@@ -8,18 +8,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..gp.namespaces import log_sum_exp, namespace
-from ..gp.process import GP, padded, padded_rows, predict
+from ..gp.process import GP, padded, predict
 from .emulator import Emulator
 from .measurement_noise import Reduced
 from .noise.run_size import Size, log_size
-from .success import log_success, padded_success
+from .success import log_success
 
 SCORES_TOGETHER = 8  # by which the scores of padded states are counted
 WALL = 0.01  # of prior quantiles, beyond a box, over which the likelihood vanishes
 
 
 class SignalState(NamedTuple):
-    """What the likelihood depends on: k scores, g nodes of the noise.
+    """Arrays on which the likelihood depends: k scores, g nodes of the noise.
 
     Scores that only fill an array come last, have `used` 0 and count as known.
     """
@@ -41,26 +41,24 @@ class SignalState(NamedTuple):
     freedom: np.ndarray | None = None
 
     def padded(self) -> "SignalState":
-        """The same likelihood in arrays of few shapes."""
+        """The same likelihood with numbers of scores of which there are few."""
         g, k = self.estimate.shape
         total = SCORES_TOGETHER * max(1, -(-k // SCORES_TOGETHER))
         covariance = np.tile(np.eye(total), (g, 1, 1))
         covariance[:, :k, :k] = self.covariance
         more = (0, total - k)
         return self._replace(
-            gp=padded(self.gp, total, padded_rows(len(self.gp.data.u))),
+            gp=padded(self.gp, total),
             used=np.pad(self.used, more),
             estimate=np.pad(self.estimate, ((0, 0), more)),
             covariance=covariance,
-            success=padded_success(self.success),
-            size=None if self.size is None else self.size.padded(),
         )
 
 
 def state_of(
     emulator: Emulator, reduced: Reduced, box: tuple[np.ndarray, np.ndarray] | None = None
 ) -> SignalState:
-    """What the likelihood depends on: of the components in use."""
+    """The state of the components in use."""
     used, d = emulator.basis.used, emulator.gp.data.u.shape[1]
     state = SignalState(
         emulator.gp.only(slice(used)),
@@ -105,8 +103,7 @@ def node_log_densities(state: SignalState, u: Any) -> Any:
 
 
 def _noise_factor(state: SignalState, size: Size, u: Any) -> Any:
-    """By how much the variance of all noise is larger at u than at size 1 of the run-to-run noise,
-    [n, g].
+    """The variance of all noise at u over that at size 1 of the run-to-run noise, [n, g].
 
     Exact where a node has no other noise, or next to no run-to-run noise; between the two, all of
     a node's noise keeps its shape while it grows.
@@ -122,7 +119,7 @@ def scores(state: SignalState, u: Any) -> tuple[Any, Any]:
 
 
 def _wall(state: SignalState, u: Any) -> Any:
-    """What the log likelihood loses outside of the box, Gaussian: gradients can climb it."""
+    """Penalty of the log likelihood outside of the box, Gaussian: gradients can climb it."""
     xp = namespace(u)
     outside = xp.maximum(state.low - u, 0.0) + xp.maximum(u - state.high, 0.0)
     return 0.5 * xp.sum((outside / WALL) ** 2, axis=-1)

@@ -132,7 +132,7 @@ def _number(named: str, returned: object) -> float:
 
 
 def numbers(residual: np.ndarray) -> float:
-    """How many numbers were observed."""
+    """Number of observed values."""
     return float(np.isfinite(residual).sum())
 
 

@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._float64 import in_float64
 from ..gp.hyperparameters import LENGTH
 from ..gp.namespaces import log_ndtr, namespace
 from ..gp.process import (
@@ -15,8 +14,6 @@ from ..gp.process import (
     condition,
     coordinates,
     covariance,
-    padded,
-    padded_rows,
     predict,
 )
 
@@ -41,7 +38,6 @@ class _Laplace(NamedTuple):
     variances: np.ndarray  # [p] of their noise
 
 
-@in_float64
 def learn_success(runs: RunOutcomes, normal: np.ndarray | None) -> GP | None:
     """A process whose normal integral is the probability of success; None if no run failed.
 
@@ -100,8 +96,3 @@ def log_success(gp: GP | None, u: Any) -> Any:
         return xp.zeros(len(u))
     mean, variance = predict(gp, u)
     return log_ndtr(mean[0] / xp.sqrt(1.0 + variance[0]))
-
-
-def padded_success(gp: GP | None) -> GP | None:
-    """The same in arrays of few shapes."""
-    return None if gp is None else padded(gp, 1, padded_rows(len(gp.data.u)))

@@ -8,13 +8,13 @@ from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri, owens_t
 
 from ..gp.namespaces import log_ndtr, log_sum_exp, namespace
-from ..gp.process import GP, padded, padded_rows, predict
-from .success import log_success, padded_success
+from ..gp.process import GP, predict
+from .success import log_success
 from .transform import Transform
 
 
 class ThresholdState(NamedTuple):
-    """What the likelihood depends on; threshold in the standardised units of the GP."""
+    """Arrays on which the likelihood depends; threshold in the standardised units of the GP."""
 
     gp: GP  # one process
     threshold: np.ndarray  # []
@@ -22,12 +22,6 @@ class ThresholdState(NamedTuple):
     resolution: np.ndarray  # [], sd of the latent mean from which doubt counts against a place
     success: GP | None = None  # see `success.learn_success`
     doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts
-
-    def padded(self) -> "ThresholdState":
-        """The same likelihood in arrays of few shapes."""
-        k, n = self.gp.weights.shape
-        success = padded_success(self.success)
-        return self._replace(gp=padded(self.gp, k, padded_rows(n)), success=success)
 
 
 class Quantile(NamedTuple):
@@ -52,7 +46,7 @@ class Matched(NamedTuple):
 
 
 Threshold = str | float | Quantile | Predicted | Matched | None
-RULES = ("min_mean", "min_observed")
+RULES = {"min_mean": Predicted(0.5), "min_observed": Quantile(0.0)}
 MATCHED_QUANTILE, LEAST_QUANTILE = 0.2, 0.02  # of a new discrepancy at the minimum
 FAR_BELOW = 1e-9  # of the way from a logarithm's end to the least discrepancy
 EXCESSES = np.geomspace(1e-8, 1e4, 400)  # over the least discrepancy, in units of it
@@ -175,8 +169,8 @@ def check_rule(rule: Threshold) -> None:
         valid = rule is None or (isinstance(rule, float | int | np.number) and np.isfinite(rule))
     if not valid:
         raise ValueError(
-            f"threshold must be one of {RULES}, Predicted(q) with 0 < q < 1, Quantile(q) with "
-            f"0 <= q <= 1, Matched(numbers) with numbers > 0, a finite "
+            f"threshold must be one of {tuple(RULES)}, Predicted(q) with 0 < q < 1, Quantile(q) "
+            f"with 0 <= q <= 1, Matched(numbers) with numbers > 0, a finite "
             f"number on the discrepancy's scale or None, got {rule!r}"
         )
 
@@ -191,10 +185,9 @@ def choose_threshold(
 
     Args:
         rule: Predicted(q), the q quantile of a new discrepancy at the
-            simulated point where the surrogate's mean is least; "min_mean", that mean, the same
-            as Predicted(0.5) (Gutmann and Corander 2016); "min_observed", the smallest
-            discrepancy so far; a Quantile of the discrepancies so far; or a number on the
-            discrepancy's own scale.
+            simulated point where the surrogate's mean is least; "min_mean", that mean
+            (Gutmann and Corander 2016); a Quantile of the discrepancies so far; "min_observed", the
+            smallest of them; or a number on the discrepancy's own scale.
         discrepancy: Finite values [n].
         transform: That of the surrogate.
         at_minimum: Mean and sd of a new discrepancy at that simulated point where the mean is
@@ -204,12 +197,10 @@ def choose_threshold(
     Raises:
         ValueError: the transform is undefined at the given number.
     """
-    rule = Predicted(0.5) if rule == "min_mean" else rule
+    rule = RULES[rule] if isinstance(rule, str) else rule
     if isinstance(rule, Predicted):
         mean, sd = at_minimum()
         return mean + sd * float(ndtri(rule.q))
-    if rule == "min_observed":
-        return float(transform(discrepancy.min()))
     if isinstance(rule, Quantile):
         return float(transform(np.quantile(discrepancy, rule.q)))
     number = float(rule)  # pyright: ignore[reportArgumentType]  # `check_rule`

@@ -41,6 +41,12 @@ TRANSFORMS: dict[str, tuple[Function, Function]] = {
 }
 
 
+def check_transform(name: object) -> None:
+    """Raise ValueError unless `name` is one of TRANSFORMS or None."""
+    if name is not None and name not in tuple(TRANSFORMS):
+        raise ValueError(f"transform must be one of {tuple(TRANSFORMS)} or None, got {name!r:.100}")
+
+
 def candidates(name: str | None, discrepancy: np.ndarray) -> list[Transform]:
     """The transforms that `discrepancy` admits.
 
@@ -50,10 +56,8 @@ def candidates(name: str | None, discrepancy: np.ndarray) -> list[Transform]:
         discrepancy: Finite values [n].
 
     Raises:
-        ValueError: unknown name, or sqrt or log of negative discrepancies.
+        ValueError: sqrt or log of negative discrepancies.
     """
-    if name is not None and name not in TRANSFORMS:
-        raise ValueError(f"transform must be one of {tuple(TRANSFORMS)} or None, got {name!r}")
     lowest = discrepancy.min()
     if lowest < 0 and name not in (None, "identity"):
         raise ValueError(

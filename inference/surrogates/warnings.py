@@ -185,7 +185,7 @@ def _too_large(errors: np.ndarray, matters: float) -> bool:
 
 
 def history_warnings(history: History) -> list[str]:
-    """That most simulations failed, and that equal seeds gave unlike signals."""
+    """Warnings if most simulations failed, or if equal seeds gave unlike signals."""
     told, succeeded = len(history.theta), int(history.succeeded.sum())
     failed = told - succeeded - history.failures.get(FailureKind.IMPOSSIBLE.value, 0)
     contradicting = history.contradicting
@@ -293,7 +293,7 @@ def unreached_warnings(observed: np.ndarray, simulated: np.ndarray, noise: float
 
 
 def distance_warnings(observed: np.ndarray, outputs: np.ndarray) -> list[str]:
-    """What the outputs show against a sum of squared differences.
+    """Warnings against a sum of squared differences.
 
     Args:
         observed: [t, ...], NaN where missing.

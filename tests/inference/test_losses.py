@@ -6,8 +6,8 @@ from importlib.resources import files
 import numpy as np
 import numpyro.distributions as dist
 import pytest
+from bolfi_liquids.inference.surrogates.discrepancy import is_outlier
 from bolfi_liquids.inference.surrogates.log_likelihood import compressed, expanded
-from bolfi_liquids.inference.surrogates.outliers import is_outlier
 from bolfi_liquids.inference.surrogates.warnings import NEGATIVE, UNCERTAIN
 
 from bolfi_liquids import inference

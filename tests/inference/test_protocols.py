@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference.acquisition.rules import RULES
 from bolfi_liquids.inference.gp.process import predict
+from bolfi_liquids.inference.sampling.nuts import padded_state
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates import base
 from bolfi_liquids.inference.surrogates.families import FAMILIES, resolve
@@ -173,7 +174,7 @@ def check_state(of):
     assert all(leaf.dtype == np.float64 for leaf in leaves if leaf.dtype.kind == "f"), kinds
     for one, other in zip(predict(of.state.gp, POINTS), predict(of.gp, POINTS), strict=True):
         np.testing.assert_allclose(one, other[: len(one)], rtol=1e-9)
-    padded = of.log_likelihood(of.state.padded(), POINTS)
+    padded = of.log_likelihood(padded_state(of.state), POINTS)
     np.testing.assert_allclose(padded, of.log_likelihood(of.state, POINTS), rtol=1e-9)
 
 
@@ -187,7 +188,7 @@ def check_log_likelihood(of):
     assert values.shape == (3,) and values.dtype == np.float64 and finite(values)
     assert np.ptp(values) > 0.0
     with jax.enable_x64(True):  # NUTS evaluates the same function by JAX
-        traced = jax.jit(of.log_likelihood)(of.state.padded(), POINTS)
+        traced = jax.jit(of.log_likelihood)(padded_state(of.state), POINTS)
     np.testing.assert_allclose(traced, values, rtol=1e-9)
 
 

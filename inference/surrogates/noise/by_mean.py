@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Protocol, cast
+from typing import ClassVar, cast
 
 import numpy as np
 from scipy.special import xlogy
@@ -22,24 +22,8 @@ LARGEST_COUNT = 1e18  # that NumPy draws
 SdOfMean = Callable[[np.ndarray], np.ndarray]
 
 
-class Law(Protocol):
-    """How values scatter around their mean; `counts` [m] samples were averaged for each."""
-
-    def check(self, values: np.ndarray) -> None: ...
-
-    def sd(self, mean: np.ndarray, counts: np.ndarray) -> np.ndarray: ...
-
-    def log_density(
-        self, value: np.ndarray, mean: np.ndarray, counts: np.ndarray
-    ) -> np.ndarray: ...
-
-    def draw(
-        self, rng: np.random.Generator, mean: np.ndarray, counts: np.ndarray
-    ) -> np.ndarray: ...
-
-
 class Poisson:
-    """Counts."""
+    """Counts; each value is the average of `counts` [m] samples."""
 
     def check(self, values: np.ndarray) -> None:
         least = values.min()
@@ -59,7 +43,7 @@ class Poisson:
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Independent Gaussian noise.
+    """Independent Gaussian noise; each value is the average of `counts` [m] samples.
 
     Attributes:
         sd_of: Its sd, from means to sds of the same shape, value by value.
@@ -98,6 +82,9 @@ class Gaussian:
     def draw(self, rng: np.random.Generator, mean: np.ndarray, counts: np.ndarray) -> np.ndarray:
         sd = self.sd(mean, counts)
         return mean + np.where(np.isfinite(sd), sd, 0.0) * rng.normal(size=mean.shape)
+
+
+Law = Poisson | Gaussian
 
 
 @dataclass(frozen=True)
@@ -139,7 +126,7 @@ class ByMean:
     There, the likelihood of each observed value is nearly Gaussian. `seen` is the Gaussian that has
     its slope and curvature at given means: iterated with the means that fit best, the posterior has
     the mode and the width of the exact one (Fisher's scoring; McCullagh and Nelder 1989, section
-    2.5).
+    2.5). Its methods are those of `scales.Plain`, which documents them.
 
     Attributes:
         law: Of the noise.

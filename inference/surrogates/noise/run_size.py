@@ -12,8 +12,6 @@ from ...gp.process import (
     Hyper,
     condition,
     leave_one_out,
-    padded,
-    padded_rows,
     predict_mean,
 )
 
@@ -29,10 +27,6 @@ class Size(NamedTuple):
     low: np.ndarray  # []
     high: np.ndarray  # []
 
-    def padded(self) -> "Size":
-        """The same in arrays of few shapes."""
-        return self._replace(gp=padded(self.gp, 1, padded_rows(len(self.gp.data.u))))
-
 
 def log_size(size: Size, u: Any) -> Any:
     """[n] at u [n, d]."""
@@ -40,7 +34,7 @@ def log_size(size: Size, u: Any) -> Any:
 
 
 def run_spread(size: Size | None, u: np.ndarray) -> np.ndarray | None:
-    """By how much the noise's variance is larger at u [n, d] than at the size 1, [n]."""
+    """The noise's variance at u [n, d] over that of the size 1, [n]."""
     return None if size is None else np.exp(2.0 * log_size(size, u))
 
 

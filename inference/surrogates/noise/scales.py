@@ -2,71 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 
 from ..given_noise import GivenNoise
 from ..output_vectors import Output
+from .by_mean import ByMean
 from .run_size import EQUAL_RUNS_TOLERANCE
 
 NEEDED_NATS = 6.0  # log likelihood that noise which grows with the mean must gain
 ANSCOMBE = 3.0 / 8.0  # of a count, added before its root is taken (Anscombe 1948)
-
-
-class OutputScale(Protocol):
-    """Values [n, m] of outputs as features [n, m], and back."""
-
-    @property
-    def observed(self) -> np.ndarray:
-        """Values [m]."""
-        ...
-
-    rounds: ClassVar[int]
-    """How often `seen` must be asked until it stays the same."""
-
-    def seen(self, at: np.ndarray | None) -> tuple[np.ndarray, GivenNoise | None]:
-        """The observed features [m] and their measurement noise, None where it is unknown.
-
-        Args:
-            at: Features around which this must be right [m]; None if they are not known yet.
-        """
-        ...
-
-    def of(self, values: np.ndarray) -> np.ndarray: ...
-
-    def back(self, features: np.ndarray) -> np.ndarray: ...
-
-    def sds(self, values: np.ndarray) -> np.ndarray:
-        """Sd of the known measurement noise of mean values, in their units [n, m]."""
-        ...
-
-    def observe(self, rng: np.random.Generator, values: np.ndarray) -> np.ndarray:
-        """Known measurement noise added to mean values [n, m]."""
-        ...
-
-    def check(self, values: np.ndarray) -> None:
-        """Raise ValueError if mean values [..., m] have no measurement noise of this kind."""
-        ...
-
-    @property
-    def unit(self) -> np.ndarray | None:
-        """Sd of the noise of each feature [m]; None where it is not known to be the same for all
-        runs."""
-        ...
-
-
-def comparable(scale: OutputScale, output: Output) -> Callable[[np.ndarray], np.ndarray]:
-    """What makes features comparable: features [n, m] -> [m]."""
-    unit = scale.unit
-    return output.scale if unit is None else lambda _: unit
-
-
-def in_units(scale: OutputScale, features: np.ndarray, sd: np.ndarray) -> np.ndarray:
-    """An sd of features [n, m] as one of their values, in the values' units."""
-    if isinstance(scale, Plain) and scale.stretch is None:
-        return sd
-    return 0.5 * (scale.back(features + sd) - scale.back(features - sd))
 
 
 def roots(values: np.ndarray) -> np.ndarray:
@@ -98,7 +44,8 @@ class Plain:
         given: The measurement noise; it is zero or unknown where values are stretched.
         stretch: None for none.
         offset: Added before [m].
-        unit: Sd of the run-to-run noise of stretched values [m].
+        unit: Sd of the noise of each feature [m], where it is known to be the same for all runs:
+            of stretched values.
     """
 
     observed: np.ndarray
@@ -107,25 +54,33 @@ class Plain:
     offset: np.ndarray | float = 0.0
     unit: np.ndarray | None = None
 
-    rounds: ClassVar[int] = 1
+    rounds: ClassVar[int] = 1  # how often `seen` must be asked until it stays the same
 
     def seen(self, at: np.ndarray | None) -> tuple[np.ndarray, GivenNoise | None]:
+        """The observed features [m] and their measurement noise, None where it is unknown.
+
+        Args:
+            at: Features around which this must be right [m]; None if they are not known yet.
+        """
         return self.of(self.observed), self.given
 
     def of(self, values: np.ndarray) -> np.ndarray:
+        """Values [n, m] as features [n, m]."""
         return values if self.stretch is None else self.stretch.of(values + self.offset)
 
     def back(self, features: np.ndarray) -> np.ndarray:
         return features if self.stretch is None else self.stretch.back(features) - self.offset
 
     def sds(self, values: np.ndarray) -> np.ndarray:
+        """Sd of the known measurement noise of mean values, in their units [n, m]."""
         return np.zeros_like(values) + (0.0 if self.given is None else np.sqrt(self.given.variance))
 
     def observe(self, rng: np.random.Generator, values: np.ndarray) -> np.ndarray:
+        """Known measurement noise added to mean values [n, m]."""
         return values if self.given is None else values + self.given.draw(rng, len(values))
 
     def check(self, values: np.ndarray) -> None:
-        """Any values will do."""
+        """Raise ValueError if mean values [..., m] have no measurement noise of this kind."""
 
     def fitting(self, u: np.ndarray, values: np.ndarray, channel: np.ndarray) -> "Plain":
         """The scale on which run-to-run noise does not grow with the mean, as far as repeated runs
@@ -165,6 +120,22 @@ class Plain:
         offset = ANSCOMBE * unit if best.power == 1 else 0.0
         noise = np.sqrt(np.where(unit > 0.0, unit, 1.0))
         return replace(self, stretch=best, offset=offset, unit=noise)
+
+
+OutputScale = Plain | ByMean
+
+
+def comparable(scale: OutputScale, output: Output) -> Callable[[np.ndarray], np.ndarray]:
+    """Scales of features: features [n, m] -> [m]."""
+    unit = scale.unit
+    return output.scale if unit is None else lambda _: unit
+
+
+def in_units(scale: OutputScale, features: np.ndarray, sd: np.ndarray) -> np.ndarray:
+    """An sd of features [n, m] as one of their values, in the values' units."""
+    if isinstance(scale, Plain) and scale.stretch is None:
+        return sd
+    return 0.5 * (scale.back(features + sd) - scale.back(features - sd))
 
 
 def repeated(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

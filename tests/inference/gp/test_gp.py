@@ -65,7 +65,7 @@ def test_jax_predicts_what_numpy_does(rows, hyper, normal):
     fitted = condition(hyper, Data(u, y, normal))
     new = np.array([[0.4, 0.7], [0.0, 1.0]])
     with jax.enable_x64(True):
-        traced = jax.jit(predict)(padded(fitted, 3, 32), jnp.asarray(new))
+        traced = jax.jit(predict)(padded(fitted, 3), jnp.asarray(new))
     for one, other in zip(traced, predict(fitted, new), strict=True):
         np.testing.assert_allclose(one[:1], other, rtol=1e-9)
 

@@ -31,6 +31,19 @@ def holes(state, u):
         return np.where(u[:, 1] < 0.5, -np.inf, np.sqrt(u[:, 0] - 0.5) * 0.0)
 
 
+def moments(cells):
+    """Mean and sd of u [d]."""
+    centre = cells.low + 0.5 * cells.width[:, None]
+    mean = cells.mass @ centre
+    return mean, np.sqrt(cells.mass @ ((centre - mean) ** 2 + cells.width[:, None] ** 2 / 12))
+
+
+def marginal(cells, j, edges):
+    """Probability of u_j between consecutive edges."""
+    below = (edges - cells.low[:, j, None]) / cells.width[:, None]
+    return np.diff(cells.mass @ np.clip(below, 0.0, 1.0))
+
+
 def target(d, sd, apart=True):
     centres = np.stack([np.full(d, 0.31), np.full(d, 0.72 if apart else 0.31)])
     return Target(peaks, (centres, np.full((2, d), sd)), d)
@@ -41,8 +54,9 @@ def target(d, sd, apart=True):
 def test_evidence_and_moments_of_a_peak(d, sd):
     cells = integrate(target(d, sd, apart=False))
     assert abs(cells.log_evidence) < 2e-3
-    np.testing.assert_allclose(cells.mean(), 0.31, atol=0.01 * sd)
-    np.testing.assert_allclose(cells.sd(), sd, rtol=0.01)
+    found = moments(cells)
+    np.testing.assert_allclose(found[0], 0.31, atol=0.01 * sd)
+    np.testing.assert_allclose(found[1], sd, rtol=0.01)
     assert cells.evaluations <= quadrature.QUICK_BUDGET
     assert cells.mass @ np.ones(len(cells.mass)) == pytest.approx(1.0)
     np.testing.assert_allclose(np.sum(cells.width**d), 1.0)  # cells fill the box
@@ -54,7 +68,7 @@ def test_marginals_with_two_separate_modes(d, sd):
     cells = integrate(target(d, sd))
     edges = np.concatenate([[0.0], 0.31 + sd * np.linspace(-2.0, 2.0, 9), [0.5, 1.0]])
     exact = 0.8 * np.diff(norm.cdf(edges, 0.31, sd)) + 0.2 * np.diff(norm.cdf(edges, 0.72, sd))
-    np.testing.assert_allclose(cells.marginal(0, edges), exact, atol=2e-3)
+    np.testing.assert_allclose(marginal(cells, 0, edges), exact, atol=2e-3)
     assert abs(cells.log_evidence) < 5e-3
 
 
@@ -65,7 +79,7 @@ def test_agrees_with_a_dense_grid_on_a_banana():
     density = np.exp(-0.5 * (x / 1.5) ** 2 - 0.5 * ((y - 0.5 * x**2 + 1.0) / 0.3) ** 2)
     assert cells.log_evidence == pytest.approx(np.log(density.mean()), abs=5e-3)
     exact = (density.sum(0) / density.sum()).reshape(20, -1).sum(1)
-    np.testing.assert_allclose(cells.marginal(1, np.linspace(0.0, 1.0, 21)), exact, atol=2e-3)
+    np.testing.assert_allclose(marginal(cells, 1, np.linspace(0.0, 1.0, 21)), exact, atol=2e-3)
 
 
 def test_a_flat_posterior_needs_the_first_grid_only():
@@ -76,7 +90,7 @@ def test_a_flat_posterior_needs_the_first_grid_only():
 
 def test_what_is_not_finite_has_no_mass():
     cells = integrate(Target(holes, (), 2))
-    np.testing.assert_allclose(cells.mean(), 0.75, atol=1e-3)
+    np.testing.assert_allclose(moments(cells)[0], 0.75, atol=1e-3)
     assert np.isfinite(cells.log_evidence)
 
 
@@ -84,7 +98,7 @@ def test_draws_follow_the_cells_and_a_shift_is_noticed():
     """Shifted by 0.2 sd: 4000 draws in 16 bins notice with near certainty."""
     cells = integrate(target(1, 0.05))
     u, _ = quadrature.draw(np.random.default_rng(0), cells, 4000)
-    expected = cells.marginal(0, np.linspace(0.2, 0.42, 12))
+    expected = marginal(cells, 0, np.linspace(0.2, 0.42, 12))
     shares = expected / expected.sum()
     for shift, passes in ((0.0, True), (0.01, False)):
         counts = np.histogram(u[:, 0] + shift, np.linspace(0.2, 0.42, 12))[0]
