@@ -18,7 +18,7 @@ from .inputs.open import open_recording
 from .inputs.settings import CalibrationSettings, PourSettings
 from .models import runtime
 from .pouring.choose import choose_pour, decided
-from .reporting.report import CHAPTERS, written
+from .reporting.report import FIGURES, written
 from .reporting.warnings import Results
 from .run.compute import HERE, Compute
 from .run.run import RUN_TOML, Run
@@ -60,7 +60,7 @@ def run_demo(
 ) -> Demo:
     """Calibrate on the bundled recording, find what is hidden in it, pour and write the report.
 
-    With an executor, the pour before criticism and the report's chapters are made in a thread
+    With an executor, the pour before criticism and the report's figures are drawn in a thread
     beside the next simulations. A second call takes everything that was simulated from the run.
 
     Args:
@@ -100,16 +100,16 @@ def run_demo(
         # the fit is bad, and without criticism nobody should pour after it
         few = PourSettings(budget=POURS)
         before = beside(decided, calibration, bundled_cups(), few, quiet)
-        chapter = beside(CHAPTERS["calibration"], calibration)
+        drawn = {"calibration": beside(FIGURES["calibration"], calibration)}
         criticism = criticise(calibration, held_out=held_out, baseline=clean, **where)
-        found = beside(CHAPTERS["criticism"], criticism)
+        drawn["criticism"] = beside(FIGURES["criticism"], criticism)
         pour_before = before.result()
         ends["criticise, pour before it"] = time.perf_counter()
         pour = choose_pour(criticism, budget=POURS, **where)
         ends["pour"] = time.perf_counter()
-        chapters = {"calibration": chapter.result(), "criticism": found.result()}
+        figures = {name: one.result() for name, one in drawn.items()}
         with Run.entered(out) as run:
-            page = written(Results.of(run), compute, chapters=chapters)
+            page = written(Results.of(run), compute, figures=figures)
         ends["report"] = time.perf_counter()
     seconds = {phase: end - before for (_, before), (phase, end) in pairwise(ends.items())}
     return Demo(calibration, criticism, pour, pour_before, page, seconds)

@@ -2,6 +2,7 @@
 
 import io
 import re
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -11,6 +12,7 @@ import numpy as np
 from .files import write_whole
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
@@ -37,6 +39,11 @@ _STYLE: dict[Any, Any] = {
     "legend.fontsize": 8.5,
 }
 RESOLUTION = 150  # dots per inch of a PNG
+HOVER_SIZE = 9.0  # points, of the place around a mark in which its text is shown
+HOVER = "hover: "
+"""Begins the ids of SVG groups whose remaining text a browser shows under the pointer."""
+
+_HOVER_GROUP = re.compile(rf"<g id=([\"']){HOVER}(.*?)\1>")
 _OUTSIDE = re.compile(r"<metadata>.*?</metadata>|\sxmlns(?::\w+)?=\"[^\"]*\"", re.DOTALL)
 
 
@@ -119,8 +126,21 @@ def panels(
     return Panels(given.flat[0].figure, given.reshape(shape), False)
 
 
+def hover(artist: "Artist", text: str) -> None:
+    """Show a text while the pointer is over an artist, where `to_svg` writes its figure."""
+    artist.set_gid(HOVER + text)
+
+
+def hover_points(axes: "Axes", x: "ArrayLike", y: "ArrayLike", texts: Sequence[str]) -> None:
+    """Show texts under the pointer near points, all of shape (n,); none where one is not finite."""
+    for at, up, text in zip(np.asarray(x), np.asarray(y), texts, strict=True):
+        if np.isfinite(at) and np.isfinite(up):
+            (unseen,) = axes.plot(at, up, "o", markersize=HOVER_SIZE, alpha=0.0)
+            hover(unseen, text)
+
+
 def to_svg(figure: "Figure", name: str) -> str:
-    """A figure as an SVG element for an HTML page.
+    """A figure as an SVG element for an HTML page, with what `hover` shows as SVG titles.
 
     Args:
         figure: Drawn under `styled`.
@@ -131,7 +151,8 @@ def to_svg(figure: "Figure", name: str) -> str:
         figure.savefig(text, format="svg", transparent=True)
     svg = text.getvalue()
     # HTML needs neither the XML prologue nor namespaces, and readers no links to standards
-    return _OUTSIDE.sub("", svg[svg.index("<svg") :]).strip()
+    whole = _OUTSIDE.sub("", svg[svg.index("<svg") :]).strip()
+    return _HOVER_GROUP.sub(r"<g><title>\2</title>", whole)
 
 
 def write_figure(figure: "Figure", out: Path, name: str) -> None:

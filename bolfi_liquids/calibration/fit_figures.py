@@ -11,11 +11,12 @@ from ..drawing import (
     LIGHT,
     ORANGE,
     Panels,
+    hover,
     new_figure,
     panels,
     styled,
+    to_svg,
 )
-from ..hover_labels import Readout, series, to_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,16 +25,16 @@ if TYPE_CHECKING:
     from ..drawing import Canvas
 
 PLANE_COLOURS = (BLUE, ORANGE)
+HOVER_STRIPS = 60  # parts of a recording whose values are shown under the pointer
 
 
 def inclination_figure(tree: "DataTree") -> str:
-    """The chart of `draw_fit`, for a page."""
+    """The figure of `draw_fit` as SVG."""
     with styled():
-        drawn, readouts = draw_fit(tree)
-        return to_chart(drawn.figure, "inclination", readouts)
+        return to_svg(draw_fit(tree).figure, "inclination")
 
 
-def draw_fit(tree: "DataTree", axes: "Canvas" = None) -> tuple[Panels, list[Readout]]:
+def draw_fit(tree: "DataTree", axes: "Canvas" = None) -> Panels:
     """Inclination against time: recorded, closest hypothesis and posterior prediction.
 
     One row of axes for each recording, one column for each plane.
@@ -46,7 +47,6 @@ def draw_fit(tree: "DataTree", axes: "Canvas" = None) -> tuple[Panels, list[Read
     members = np.unique(recorded["recording"])
     size = 8.6, 2.6 * len(members) + 0.4
     drawn = panels(axes, (len(members), 2), size, sharex="row", sharey=True)
-    readouts = []
     for row, member in zip(drawn.grid, members, strict=True):
         frames = np.flatnonzero(recorded["recording"].to_numpy() == member)
         for axis, plane in zip(row, recorded["plane"].to_numpy(), strict=True):
@@ -54,18 +54,16 @@ def draw_fit(tree: "DataTree", axes: "Canvas" = None) -> tuple[Panels, list[Read
                 name: tree[name].to_dataset().sel(plane=plane).isel(frame=frames)
                 for name in ("recorded", "closest", "posterior_predictive")
             }
-            readout = _draw_inclination(axis, part)
-            readout.content.update(plane=str(plane), recording=int(member))
-            readouts.append(readout)
+            _draw_inclination(axis, part)
             axis.set_title(f"{plane} plane", loc="left")
         row[0].set_ylabel("inclination [deg]")
     for axis in drawn.grid[-1]:
         axis.set_xlabel("time [s]")
     drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
-    return drawn, readouts
+    return drawn
 
 
-def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> Readout:
+def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> None:
     time = part["recorded"]["time"].to_numpy()
     degrees = {name: np.degrees(data["inclination"].to_numpy()) for name, data in part.items()}
     predicted = degrees["posterior_predictive"].reshape(-1, len(time))
@@ -82,13 +80,13 @@ def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> Readout:
     axes.plot(time, degrees["closest"], color=ORANGE, linewidth=1.1, label="closest hypothesis")
     axes.plot(time, degrees["recorded"], color=INK, linewidth=0.9, label="recorded")
     axes.axhline(0.0, color=LIGHT, linewidth=0.8, zorder=0)
-    lines = {
-        "recorded": degrees["recorded"],
-        "closest": degrees["closest"],
-        "predicted, least": low,
-        "predicted, most": high,
-    }
-    return series(axes, time, lines)
+    for frames in np.array_split(np.arange(len(time)), min(HOVER_STRIPS, len(time))):
+        at, end = frames[len(frames) // 2], min(frames[-1] + 1, len(time) - 1)
+        hover(
+            axes.axvspan(time[frames[0]], time[end], alpha=0.0),
+            f"{time[at]:.2f} s: recorded {degrees['recorded'][at]:.2f}°, closest "
+            f"{degrees['closest'][at]:.2f}°, predicted {low[at]:.2f}° to {high[at]:.2f}°",
+        )
 
 
 def stroke_figure(tree: "DataTree") -> str:
@@ -98,40 +96,37 @@ def stroke_figure(tree: "DataTree") -> str:
     if "stroke" not in recorded:  # of a run that was made before they were kept
         return ""
     members = np.unique(recorded["recording"])
-    readouts = []
     with styled():
         figure = new_figure(8.6, 2.2 * len(members) + 0.4)
         grid = figure.subplots(len(members), 1, squeeze=False)[:, 0]
         for axes, member in zip(grid, members, strict=True):
             frames = np.flatnonzero(recorded["recording"].to_numpy() == member)
             parts = (recorded, tree["posterior_predictive"].to_dataset())
-            readouts.append(_draw_strokes(axes, *(part.isel(frame=frames) for part in parts)))
+            _draw_strokes(axes, *(part.isel(frame=frames) for part in parts))
             axes.set_ylabel("RMS [deg]")
         grid[-1].set_xlabel("stroke")
         handles, labels = grid[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=3)
-        return to_chart(figure, "by-stroke", readouts)
+        return to_svg(figure, "by-stroke")
 
 
-def _draw_strokes(axes: "Axes", recorded: "Dataset", predicted: "Dataset") -> Readout:
+def _draw_strokes(axes: "Axes", recorded: "Dataset", predicted: "Dataset") -> None:
     numbers = recorded["stroke"].to_numpy()
     strokes = np.unique(numbers)
     seen = np.degrees(recorded["inclination"].to_numpy())
     shown = np.degrees(predicted["inclination"].to_numpy()).reshape(-1, *seen.shape)
     left, spread = seen - shown.mean(axis=0), shown.std(axis=0, ddof=1)
-    lines = {}
     for at, plane in enumerate(recorded["plane"].to_numpy()):
         rms = _rms_by(numbers, left[:, at])
         place = np.arange(len(strokes)) + 0.4 * (at - 0.5)
-        axes.bar(place, rms, 0.36, color=PLANE_COLOURS[at], label=f"{plane} plane")
-        lines[f"{plane} plane"] = rms
+        bars = axes.bar(place, rms, 0.36, color=PLANE_COLOURS[at], label=f"{plane} plane")
+        for bar, number, height in zip(bars, strokes, rms, strict=True):
+            hover(bar, f"stroke {number}, {plane} plane: {height:.2f}°")
     usual = _rms_by(numbers, spread)
     axes.step(np.arange(-1, len(strokes) + 1), np.pad(usual, 1, mode="edge"), where="mid",
               color=INK, lw=1.0, label="sd of the predictions")  # fmt: skip
     axes.set_xlim(-0.6, len(strokes) - 0.4)
     axes.set_xticks(range(len(strokes)), [str(number) for number in strokes])
-    return series(axes, np.arange(len(strokes)), {**lines, "sd of the predictions": usual},
-                  names=[f"stroke {number}" for number in strokes])  # fmt: skip
 
 
 def _rms_by(numbers: NDArray, values: NDArray) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from ..calibration.summary import Fitted
 from ..drawing import given_or_shown
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..run.run import Run, RunOrPath, key_of
-from ..wording import html_table, sentence, spoken
+from ..wording import html_table, spoken
 from .summary import CriticismSummary
 
 if TYPE_CHECKING:
@@ -47,8 +47,7 @@ class Criticism:
     def _repr_html_(self) -> str:
         rows = {"run": self.base.path, "verdict": self.verdict, "p": f"{self.summary.p_value:.2g}"}
         rows |= {
-            spoken(name): sentence("criticism.interval", name=name, values=values)
-            for name, values in self.summary.coefficient.items()
+            spoken(name): values.interval(name) for name, values in self.summary.coefficient.items()
         }
         if self.effects and not self.summary.coefficient:
             rows["effects"] = ", ".join(map(spoken, self.effects))

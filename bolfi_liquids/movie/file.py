@@ -5,6 +5,7 @@ imageio-ffmpeg would add 68 MB.
 
 from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
+from io import BytesIO
 from itertools import chain
 from pathlib import Path
 
@@ -52,6 +53,13 @@ def write_movie(path: Path, pictures: Pictures, rate: float = PICTURE_RATE) -> P
     return write_whole(path, lambda temporary: write(temporary, pictures, rate))
 
 
+def encoded(pictures: Pictures, rate: float) -> bytes:
+    """A movie in WebP, of pictures and rate as `write_movie` takes them."""
+    content = BytesIO()
+    _write_webp(content, pictures, rate)
+    return content.getvalue()
+
+
 def _av():
     try:
         import av
@@ -76,15 +84,15 @@ def _write_mp4(path: Path, pictures: Pictures, rate: float) -> None:
         file.mux(stream.encode())
 
 
-def _write_gif(path: Path, pictures: Pictures, rate: float) -> None:
+def _write_gif(path: Path | BytesIO, pictures: Pictures, rate: float) -> None:
     _write_animation(path, pictures, rate, format="GIF", optimize=False)
 
 
-def _write_webp(path: Path, pictures: Pictures, rate: float) -> None:
+def _write_webp(path: Path | BytesIO, pictures: Pictures, rate: float) -> None:
     _write_animation(path, pictures, rate, format="WEBP", quality=85, method=2)
 
 
-def _write_animation(path: Path, pictures: Pictures, rate: float, **options) -> None:
+def _write_animation(path: Path | BytesIO, pictures: Pictures, rate: float, **options) -> None:
     from PIL import Image
 
     images = [Image.fromarray(picture) for picture in pictures]

@@ -1,9 +1,10 @@
 """report.html: one file that shows a run, without anything from outside it."""
 
-import json
+import base64
 from collections.abc import Callable, Mapping
-from dataclasses import astuple
+from functools import partial
 from importlib.resources import files
+from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -12,22 +13,28 @@ from ..calibration.fit_figures import inclination_figure, stroke_figure
 from ..calibration.posterior_figure import posterior_figure
 from ..calibration.result import Calibration
 from ..calibration.search_figure import search_figure
-from ..calibration.summary import CalibrationSummary
+from ..criticism.effect_figures import coefficient_plot, confusion_plot, score_plot
+from ..criticism.figures import held_out_plot, pour_residual_plot, residual_plot, stroke_plot
+from ..criticism.result import Criticism
+from ..drawing import to_svg
 from ..files import write_text
-from ..hover_labels import script_json
 from ..inputs.prior import Described
+from ..pouring.figures import pour_figure
 from ..pouring.result import Pour
 from ..run.compute import Compute, open_compute
 from ..run.run import REPORT, Run, RunOrPath
-from ..wording import LIQUID_UNITS, sentence
-from . import sentences
-from .criticism_chapter import criticism_context
-from .warnings import Results, warnings_of
+from ..wording import spoken
+from .facts import held_out_of
+from .prose import prose
+from .warnings import Results
 
 if TYPE_CHECKING:
     from ..inference.simulations import Workers
 
-PAGE_TEMPLATE = "report.html.jinja"
+PAGE_TEMPLATE, STYLE = "report.html.jinja", "report.css"
+
+Figures = dict[str, str]
+"""SVG elements by name."""
 
 
 def report(
@@ -43,7 +50,7 @@ def report(
     Args:
         run: A RUN directory with a finished calibration; or a calibration, criticism or pour.
         moving: Whether it has moving pictures, of a few stirs and pours that are simulated for
-            them once and kept in RUN/frames.nc; nothing else is simulated.
+            them once and kept in RUN/moving; nothing else is simulated.
         executor, timeout, progress: Of their simulations, see `calibrate`.
 
     Raises:
@@ -63,7 +70,7 @@ def written(
     compute: Compute,
     *,
     moving: bool = True,
-    chapters: Mapping[str, Any] = MappingProxyType({}),
+    figures: Mapping[str, Figures] = MappingProxyType({}),
 ) -> Path:
     """Write RUN/report.html from given results.
 
@@ -71,24 +78,8 @@ def written(
         results: What the run holds.
         compute: Where moving pictures are simulated.
         moving: See `report`.
-        chapters: What is drawn already, by the names of `CHAPTERS`.
+        figures: Those that are drawn already, by the names of `FIGURES`.
     """
-    calibration = results.calibration
-    pictures = _moving(results, compute) if moving else None
-    given = {name: getattr(results, name) for name in CHAPTERS}
-    drawn = {
-        name: chapters.get(name) or (one and CHAPTERS[name](one)) for name, one in given.items()
-    }
-    page = _page(drawn, results, pictures)
-    return write_text(calibration.path / REPORT, page)
-
-
-def _page(
-    chapters: Mapping[str, Any],
-    results: Results,
-    pictures: dict[str, Any] | None,
-) -> str:
-    """The page of a run, with moving pictures if there are any."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -98,40 +89,120 @@ def _page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(PAGE_TEMPLATE).render(
-        **chapters,
-        warnings=warnings_of(results),
-        moving=pictures,
-        moving_json=script_json(pictures),
-        style=_text("report.css"),
-        script=_text("report.js"),
+    facts, given = results.facts, {name: getattr(results, name) for name in FIGURES}
+    page = environment.get_template(PAGE_TEMPLATE).render(
+        **facts,
+        prose=partial(prose, facts=facts),
+        figures={
+            name: figures.get(name) or (one and FIGURES[name](one)) for name, one in given.items()
+        },
+        films=_films(results, compute) if moving else {},
+        made_with=_made_with(results),
+        style=(files("bolfi_liquids.data") / STYLE).read_text(encoding="utf-8"),
         record=results.calibration.record,
         run=results.calibration.path,
     )
+    return write_text(results.calibration.path / REPORT, page)
 
 
-def calibration_context(calibration: Calibration) -> dict[str, Any]:
-    summary, tree = calibration.summary, calibration.tree
-    prior = tree["prior"]
+def _calibration_figures(calibration: Calibration) -> Figures:
+    tree = calibration.tree
     return {
-        "summary": summary,
-        "parameters": [
-            sentences.parameter_sentence(name, values, prior[name].to_numpy().ravel())
-            for name, values in summary.parameters.items()
-        ],
-        "fit": sentences.fit_sentence(summary),
-        "model_error": sentences.model_error_sentence(summary),
         "inclination": inclination_figure(tree),
         "by_stroke": stroke_figure(tree),
         "posterior": posterior_figure(tree),
         "search": search_figure(tree),
-        "start": min(int(tree.attrs["initial"]), summary.n_simulations),
-        "confirming": tree["simulations"].sizes["simulation"] - summary.n_simulations,
-        "priors": {
-            name: prior_text(one) for name, one in calibration.record["settings"]["prior"].items()
-        },
-        "rows": [_row(name, summary) for name in summary.parameters],
     }
+
+
+def _criticism_figures(criticism: Criticism) -> Figures:
+    tree, accepted = criticism.tree, criticism.summary.accepted
+    stirs, pours = tree.children["stirs"], tree.children.get("pours")
+    drawn = {"residual": residual_plot(stirs), "strokes": stroke_plot(stirs)}
+    if accepted:
+        drawn["coefficient"] = coefficient_plot(tree, accepted)
+    if held_out_of(stirs) is not None:
+        drawn["held_out"] = held_out_plot(stirs)
+    if pours is not None:
+        drawn["pours"] = pour_residual_plot(pours)
+    for name, source in tree.children.items():
+        if name in ("stirs", "pours"):
+            drawn[f"scores_{name}"] = score_plot(source)
+            drawn[f"confusion_{name}"] = confusion_plot(source)
+    return {name: to_svg(of.figure, name) for name, of in drawn.items()}
+
+
+def _pour_figures(pour: Pour) -> Figures:
+    return {"pour": pour_figure(pour.tree)}
+
+
+FIGURES: dict[str, Callable[[Any], Figures]] = {
+    "calibration": _calibration_figures,
+    "criticism": _criticism_figures,
+    "pour": _pour_figures,
+}
+"""Draws the figures of each result."""
+
+
+def _films(results: Results, compute: Compute) -> dict[str, list[dict[str, str]]]:
+    """The films of the latest posterior and the pour: caption, a still and the film, as URLs."""
+    from .films import films_of
+
+    shown: dict[str, list[dict[str, str]]] = {}
+    for film in films_of(results.latest, results.pour, compute):
+        if content := film.path.read_bytes():
+            each = {"liquid": str(film.draw), "still": _url(_still(content)), "film": _url(content)}
+            shown.setdefault(film.name, []).append(each)
+    return shown
+
+
+def _still(content: bytes) -> bytes:
+    """The picture in the middle of a film."""
+    from PIL import Image, ImageSequence
+
+    picture = BytesIO()
+    with Image.open(BytesIO(content)) as film:
+        pictures = ImageSequence.all_frames(film)
+    pictures[len(pictures) // 2].convert("RGB").save(picture, "WEBP", quality=85)
+    return picture.getvalue()
+
+
+def _url(content: bytes) -> str:
+    return f"data:image/webp;base64,{base64.b64encode(content).decode()}"
+
+
+def _made_with(results: Results) -> dict[str, str]:
+    """Settings, inputs and versions, for a table."""
+    record, rows = results.calibration.record, dict[str, Any]()
+    settings = dict(record["settings"])
+    priors = settings.pop("prior")
+    rows |= settings
+    rows |= {f"prior of {name}": prior_text(one) for name, one in priors.items()}
+    if results.criticism is not None:
+        rows |= {f"criticism: {name}": of for name, of in _criticism_rows(results.criticism)}
+    if results.pour is not None:
+        of_pour = results.pour.tree.attrs
+        left_out = ("made_from", "summary", "least_viscosity", "map_error")
+        rows |= {f"pour: {name}": of for name, of in of_pour.items() if name not in left_out}
+    hashes = zip(record["files"]["recordings"], record["inputs"]["sha256"], strict=True)
+    rows |= {f"{file}, SHA-256": digest for file, digest in hashes}
+    rows |= record["versions"]
+    return {name: str(value) for name, value in rows.items()}
+
+
+def _criticism_rows(criticism: Criticism) -> list[tuple[str, str]]:
+    """Settings of a criticism, and each of its files with its hash."""
+    made_from = criticism.made_from
+    settings = {"version": made_from["version"], **made_from["settings"]}
+    rows = [
+        (key, ", ".join(map(str, value)) if isinstance(value, list) else str(value))
+        for key, value in settings.items()
+    ]
+    for group in ("held_out", "baseline", "pours", "held_out_pours"):
+        label, given = spoken(group), made_from[group].items()
+        rows += [(f"{label} {name}, SHA-256", digest) for name, digest in given]
+        rows += [] if given else [(label, "none")]
+    return rows
 
 
 def prior_text(described: Described) -> str:
@@ -145,54 +216,3 @@ def prior_text(described: Described) -> str:
         return f"{described['family']}({values['low']}, {values['high']})"
     named = ", ".join(f"{name}={value}" for name, value in values.items())
     return f"{described['family']}({named})"
-
-
-def _row(name: str, summary: CalibrationSummary) -> dict[str, Any]:
-    numbers = [*astuple(summary.parameters[name]), summary.best[name], summary.closest[name]]
-    return {
-        "name": name,
-        "unit": LIQUID_UNITS.get(name, "1"),
-        "numbers": [f"{number:.3g}" for number in numbers],
-    }
-
-
-def _pour_context(pour: Pour) -> dict[str, Any]:
-    from .pour_figure import pour_figure
-
-    summary, tree = pour.summary, pour.tree
-    return {
-        "summary": summary,
-        "chosen": sentences.pour_sentence(summary),
-        "plug_in": sentences.plug_in_sentence(summary),
-        "fate": sentences.fate_sentences(summary),
-        "given": sentences.given_sentences(summary),
-        "map": sentences.map_sentences(summary),
-        "limits": sentence("pour.limits"),
-        "contact_angle": sentences.contact_angle_sentences(json.loads(tree.attrs["cups"])),
-        "figure": pour_figure(tree),
-        "made_with": {k: v for k, v in tree.attrs.items() if k not in ("made_from", "summary")},
-        "rows": [("chosen pour", summary), ("best at θ* alone", summary.plug_in)],
-    }
-
-
-CHAPTERS: dict[str, Callable[[Any], dict[str, Any]]] = {
-    "calibration": calibration_context,
-    "criticism": criticism_context,
-    "pour": _pour_context,
-}
-"""What the template needs of each result."""
-
-
-def _moving(results: Results, compute: Compute) -> dict[str, Any] | None:
-    """Moving pictures of the latest posterior and the pour."""
-    from .frames import Shown, frames_of
-    from .moving_pictures import moving_context
-
-    latest = results.latest
-    shown = Shown(latest, latest.run.recordings[0], results.pour)
-    return moving_context(shown, frames_of(shown, compute))
-
-
-def _text(name: str) -> str:
-    """Of a file that stands in the page as it is."""
-    return (files("bolfi_liquids.data") / name).read_text(encoding="utf-8")

@@ -13,7 +13,7 @@ from ..models import Cups
 from ..pouring.result import Judged, Pour
 from ..reporting.warnings import Results, warnings_of
 from ..run.run import RESULTS, Run
-from ..wording import Sentence, at_most, spilled
+from ..wording import at_most, spilled
 
 ROUNDING = 1e-9  # relative, of an action that was written and read again
 BAD_FIT = "it was chosen over a bad fit: an arm carries it out with --despite-bad-fit only"
@@ -35,7 +35,7 @@ class ChosenPour:
     judged: Judged
     cups: Cups
     fit_is_bad: bool
-    warnings: tuple[Sentence, ...]
+    warnings: tuple[str, ...]
 
     def check_fit(self, *, despite_bad_fit: bool) -> None:
         """Refuse a pour that was chosen over a posterior whose fit is bad.

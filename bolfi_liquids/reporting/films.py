@@ -1,0 +1,223 @@
+"""Moving pictures of the page: the stirring and the chosen pour, of a few liquids of the posterior.
+
+Each is a film in the folder `moving` of the run, simulated and drawn as by `simulate --movie`. Its
+name ends with a digest of everything that it shows; a film that is there is not made again.
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..files import write_whole
+from ..inputs.cups import kept_cups
+from ..inputs.prior import split_parameters
+from ..movie.file import encoded
+from ..progress import progress_bar
+from ..run.compute import HERE, Compute
+from ..run.run import MOVING, as_json
+from ..seeds import Phase, simulation_seeds
+from ..wording import with_unit
+
+if TYPE_CHECKING:
+    from ..calibration.result import Calibration
+    from ..calibration.stir_simulator import Stirring
+    from ..models import Cups
+    from ..pouring.result import Pour
+
+N_DRAWS_SHOWN = 3
+"""Posterior draws that are shown."""
+
+MAX_STIR_SECONDS = 6.0
+"""Of a stir that is shown [s]."""
+
+FILM_RATE = 8.0
+"""Pictures per second."""
+
+
+class Draw(NamedTuple):
+    """A liquid of the posterior, and the seed with which it is shown."""
+
+    liquid: dict[str, float]
+    effects: dict[str, float]
+    seed: int
+
+    def __str__(self) -> str:
+        shown = {**self.liquid, **self.effects}
+        return ", ".join(f"{name} {with_unit(name, value)}" for name, value in shown.items())
+
+
+class StirScene(NamedTuple):
+    """A stir that can be shown, of any liquid.
+
+    Attributes:
+        stirring: Of one recording.
+        timeout: Seconds that one simulation may take; None sets no limit.
+    """
+
+    stirring: "Stirring"
+    timeout: float | None
+
+    def __call__(self, draw: Draw) -> bytes:
+        """A film in WebP; empty where the simulation diverges."""
+        from .. import models
+        from ..movie.stir import stir_pictures
+
+        (recording,), (setup,) = self.stirring.recordings, self.stirring.setups
+        liquid = models.Liquid(**draw.liquid, density=recording.number("liquid_density"))
+        with _limited(self.timeout):
+            frames = models.stir_frames(
+                liquid, recording.gripper, setup, draw.seed, rate=FILM_RATE, effects=draw.effects
+            )
+        if not np.isfinite(frames.tip).all():
+            return b""
+        return encoded(stir_pictures(frames, setup, [str(draw)]), FILM_RATE)
+
+
+class PourScene(NamedTuple):
+    """A pour that can be shown, of any liquid.
+
+    Attributes:
+        cups: Source and receiver.
+        angular_velocity, distance: The chosen action [rad/s], [m].
+        density: Of the liquid [kg/m3].
+        timeout: Seconds that one simulation may take; None sets no limit.
+    """
+
+    cups: "Cups"
+    angular_velocity: float
+    distance: float
+    density: float
+    timeout: float | None
+
+    def __call__(self, draw: Draw) -> bytes:
+        """A film in WebP; empty where the simulation diverges."""
+        from .. import models
+        from ..movie.pour import pour_pictures
+
+        liquid = models.Liquid(**draw.liquid, density=self.density)
+        action = liquid, self.angular_velocity, self.cups, [draw.seed]
+        with _limited(self.timeout):
+            frames = models.pour_frames(
+                models.PourBatch(*action, effects=draw.effects), rate=FILM_RATE
+            )
+        result = frames.landed.into(self.distance, self.cups.receiver.radius)
+        if not np.isfinite(result.spilled).all():
+            return b""
+        pictures = pour_pictures(frames, frames.landed, self.cups, self.distance, [str(draw)])
+        return encoded(pictures, FILM_RATE)
+
+
+class Film(NamedTuple):
+    """A film of a run.
+
+    Attributes:
+        name: "stir" or "pour".
+        scene: Makes it.
+        draw: The liquid that it shows.
+        path: Its file.
+    """
+
+    name: str
+    scene: StirScene | PourScene
+    draw: Draw
+    path: Path
+
+
+def films_of(
+    calibration: "Calibration", pour: "Pour | None", compute: Compute = HERE
+) -> list[Film]:
+    """The run's films, those of the stir first; simulated where they are not there.
+
+    Args:
+        calibration: The latest.
+        pour: The chosen one; None where there is none.
+        compute: Where draws are simulated.
+
+    Raises:
+        RuntimeError: A simulation took longer than the timeout.
+    """
+    films = _wanted(calibration, pour, compute.timeout)
+    folder = calibration.path / MOVING
+    folder.mkdir(exist_ok=True)
+    missing = [film for film in films if not film.path.exists()]
+    try:
+        with progress_bar("moving pictures", len(missing), shown=compute.progress) as advance:
+            for film, content in zip(missing, _made(missing, compute.executor), strict=True):
+                write_whole(film.path, lambda at, content=content: at.write_bytes(content))
+                advance(1)
+    except TimeoutError as err:
+        if compute.timeout is None:
+            raise
+        raise RuntimeError(
+            f"a moving picture took longer than {compute.timeout:g} s to simulate; allow more "
+            "time, or leave the pictures out by --still, in Python by moving=False"
+        ) from err
+    for outdated in set(folder.iterdir()) - {film.path for film in films}:
+        outdated.unlink()
+    return films
+
+
+def _wanted(calibration: "Calibration", pour: "Pour | None", timeout: float | None) -> list[Film]:
+    """The films of a run."""
+    from ..calibration.stir_simulator import stirring_of
+    from ..models import MODEL_VERSION
+
+    settings, whole = calibration.record["settings"], calibration.run.recordings[0]
+    recording = whole.first(int(np.sum(whole.time - whole.time[0] <= MAX_STIR_SECONDS)))
+    scenes: dict[str, StirScene | PourScene] = {
+        "stir": StirScene(stirring_of([recording], int(settings["particles"])), timeout)
+    }
+    made_from: dict[str, Any] = {
+        "stir": {"recording": recording.hash, "particles": settings["particles"]}
+    }
+    if pour is not None:
+        cups, action = json.loads(pour.tree.attrs["cups"]), pour.chosen.action
+        density = calibration.liquid_density
+        scenes["pour"] = PourScene(kept_cups(cups), **action, density=density, timeout=timeout)
+        made_from["pour"] = {**action, "cups": cups, "density": density}
+    draws = _draws(calibration.draws(N_DRAWS_SHOWN, seed := int(settings["seed"])), seed)
+    common = {"model": MODEL_VERSION, "rate": FILM_RATE, "seconds": MAX_STIR_SECONDS}
+
+    def path_of(name: str, number: int, draw: Draw) -> Path:
+        shown = as_json({**common, **made_from[name], **draw._asdict()})
+        digest = sha256(shown.encode()).hexdigest()[:12]
+        return calibration.path / MOVING / f"{name}-{number}-{digest}.webp"
+
+    return [
+        Film(name, scene, draw, path_of(name, number, draw))
+        for name, scene in scenes.items()
+        for number, draw in enumerate(draws, start=1)
+    ]
+
+
+def _draws(theta: Mapping[str, np.ndarray], seed: int) -> list[Draw]:
+    """Each draw of theta, values of shape (draws,), with a seed."""
+    liquid, effects = split_parameters(theta)
+    seeds = simulation_seeds(seed, Phase.MOVING_PICTURES, N_DRAWS_SHOWN)
+
+    def one(values: Mapping[str, np.ndarray], at: int) -> dict[str, float]:
+        return {name: float(of[at]) for name, of in values.items()}
+
+    return [Draw(one(liquid, at), one(effects, at), seed) for at, seed in enumerate(seeds)]
+
+
+def _made(films: list[Film], workers: Executor | None) -> Iterator[bytes]:
+    """The content of each film, in order; an executor begins with all of them at once."""
+    return map(_shown, films) if workers is None else workers.map(_shown, films)
+
+
+def _shown(film: Film) -> bytes:
+    return film.scene(film.draw)
+
+
+def _limited(timeout: float | None) -> AbstractContextManager[None]:
+    """Inside, a simulation that takes longer raises TimeoutError."""
+    from ..models import time_limit
+
+    return nullcontext() if timeout is None else time_limit(timeout)
