@@ -81,9 +81,9 @@ def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> None:
     axes.plot(time, degrees["recorded"], color=INK, linewidth=0.9, label="recorded")
     axes.axhline(0.0, color=LIGHT, linewidth=0.8, zorder=0)
     for frames in np.array_split(np.arange(len(time)), min(HOVER_STRIPS, len(time))):
-        at, end = frames[len(frames) // 2], min(frames[-1] + 1, len(time) - 1)
+        at, last = frames[len(frames) // 2], min(frames[-1] + 1, len(time) - 1)
         hover(
-            axes.axvspan(time[frames[0]], time[end], alpha=0.0),
+            axes.axvspan(float(time[frames[0]]), float(time[last]), alpha=0.0),
             f"{time[at]:.2f} s: recorded {degrees['recorded'][at]:.2f}°, closest "
             f"{degrees['closest'][at]:.2f}°, predicted {low[at]:.2f}° to {high[at]:.2f}°",
         )
