@@ -17,6 +17,7 @@ import numpy as np
 from ..files import write_whole
 from ..inputs.cups import kept_cups
 from ..inputs.prior import split_parameters
+from ..inputs.recording import Recording
 from ..movie.file import encoded
 from ..progress import progress_bar
 from ..run.compute import HERE, Compute
@@ -26,8 +27,6 @@ from ..wording import with_unit
 
 if TYPE_CHECKING:
     from ..calibration.result import Calibration
-    from ..calibration.stir_simulator import Stirring
-    from ..models import Cups
     from ..pouring.result import Pour
 
 N_DRAWS_SHOWN = 3
@@ -56,19 +55,30 @@ class StirScene(NamedTuple):
     """A stir that can be shown, of any liquid.
 
     Attributes:
-        stirring: Of one recording.
+        recording: Whose path is stirred.
+        particles: Number of particles; 0 for the default.
         timeout: Seconds that one simulation may take; None sets no limit.
     """
 
-    stirring: "Stirring"
+    recording: Recording
+    particles: int
     timeout: float | None
+
+    name = "stir"
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """All that is shown besides the liquid."""
+        return {"recording": self.recording.hash, "particles": self.particles}
 
     def __call__(self, draw: Draw) -> bytes:
         """A film in WebP; empty where the simulation diverges."""
         from .. import models
+        from ..calibration.stir_simulator import stirring_of
         from ..movie.stir import stir_pictures
 
-        (recording,), (setup,) = self.stirring.recordings, self.stirring.setups
+        recording = self.recording
+        (setup,) = stirring_of([recording], self.particles).setups
         liquid = models.Liquid(**draw.liquid, density=recording.number("liquid_density"))
         with _limited(self.timeout):
             frames = models.stir_frames(
@@ -83,33 +93,40 @@ class PourScene(NamedTuple):
     """A pour that can be shown, of any liquid.
 
     Attributes:
-        cups: Source and receiver.
+        settings: Of source and receiver, see `Cups.settings`.
         angular_velocity, distance: The chosen action [rad/s], [m].
         density: Of the liquid [kg/m3].
         timeout: Seconds that one simulation may take; None sets no limit.
     """
 
-    cups: "Cups"
+    settings: dict[str, Any]
     angular_velocity: float
     distance: float
     density: float
     timeout: float | None
+
+    name = "pour"
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """All that is shown besides the liquid."""
+        return self._replace(timeout=None)._asdict()
 
     def __call__(self, draw: Draw) -> bytes:
         """A film in WebP; empty where the simulation diverges."""
         from .. import models
         from ..movie.pour import pour_pictures
 
-        liquid = models.Liquid(**draw.liquid, density=self.density)
-        action = liquid, self.angular_velocity, self.cups, [draw.seed]
+        liquid, cups = models.Liquid(**draw.liquid, density=self.density), kept_cups(self.settings)
+        pour = models.PourBatch(
+            liquid, self.angular_velocity, cups, [draw.seed], effects=draw.effects
+        )
         with _limited(self.timeout):
-            frames = models.pour_frames(
-                models.PourBatch(*action, effects=draw.effects), rate=FILM_RATE
-            )
-        result = frames.landed.into(self.distance, self.cups.receiver.radius)
+            frames = models.pour_frames(pour, rate=FILM_RATE)
+        result = frames.landed.into(self.distance, cups.receiver.radius)
         if not np.isfinite(result.spilled).all():
             return b""
-        pictures = pour_pictures(frames, frames.landed, self.cups, self.distance, [str(draw)])
+        pictures = pour_pictures(frames, frames.landed, cups, self.distance, [str(draw)])
         return encoded(pictures, FILM_RATE)
 
 
@@ -117,13 +134,11 @@ class Film(NamedTuple):
     """A film of a run.
 
     Attributes:
-        name: "stir" or "pour".
         scene: Makes it.
         draw: The liquid that it shows.
         path: Its file.
     """
 
-    name: str
     scene: StirScene | PourScene
     draw: Draw
     path: Path
@@ -142,8 +157,22 @@ def films_of(
     Raises:
         RuntimeError: A simulation took longer than the timeout.
     """
-    films = _wanted(calibration, pour, compute.timeout)
-    folder = calibration.path / MOVING
+    settings, whole = calibration.record["settings"], calibration.run.recordings[0]
+    recording = whole.first(int(np.sum(whole.time - whole.time[0] <= MAX_STIR_SECONDS)))
+    scenes: list[StirScene | PourScene] = [
+        StirScene(recording, int(settings["particles"]), compute.timeout)
+    ]
+    if pour is not None:
+        cups, density = json.loads(pour.tree.attrs["cups"]), calibration.liquid_density
+        action = pour.chosen.angular_velocity, pour.chosen.distance
+        scenes.append(PourScene(cups, *action, density, compute.timeout))
+    seed, folder = int(settings["seed"]), calibration.path / MOVING
+    draws = _draws(calibration.draws(N_DRAWS_SHOWN, seed), seed)
+    films = [
+        Film(scene, draw, folder / f"{scene.name}-{number}-{_digest(scene, draw)}.webp")
+        for scene in scenes
+        for number, draw in enumerate(draws, start=1)
+    ]
     folder.mkdir(exist_ok=True)
     missing = [film for film in films if not film.path.exists()]
     try:
@@ -158,42 +187,18 @@ def films_of(
             f"a moving picture took longer than {compute.timeout:g} s to simulate; allow more "
             "time, or leave the pictures out by --still, in Python by moving=False"
         ) from err
-    for outdated in set(folder.iterdir()) - {film.path for film in films}:
+    for outdated in set(folder.glob("*.webp")) - {film.path for film in films}:
         outdated.unlink()
     return films
 
 
-def _wanted(calibration: "Calibration", pour: "Pour | None", timeout: float | None) -> list[Film]:
-    """The films of a run."""
-    from ..calibration.stir_simulator import stirring_of
+def _digest(scene: StirScene | PourScene, draw: Draw) -> str:
+    """Of all that a film shows."""
     from ..models import MODEL_VERSION
 
-    settings, whole = calibration.record["settings"], calibration.run.recordings[0]
-    recording = whole.first(int(np.sum(whole.time - whole.time[0] <= MAX_STIR_SECONDS)))
-    scenes: dict[str, StirScene | PourScene] = {
-        "stir": StirScene(stirring_of([recording], int(settings["particles"])), timeout)
-    }
-    made_from: dict[str, Any] = {
-        "stir": {"recording": recording.hash, "particles": settings["particles"]}
-    }
-    if pour is not None:
-        cups, action = json.loads(pour.tree.attrs["cups"]), pour.chosen.action
-        density = calibration.liquid_density
-        scenes["pour"] = PourScene(kept_cups(cups), **action, density=density, timeout=timeout)
-        made_from["pour"] = {**action, "cups": cups, "density": density}
-    draws = _draws(calibration.draws(N_DRAWS_SHOWN, seed := int(settings["seed"])), seed)
     common = {"model": MODEL_VERSION, "rate": FILM_RATE, "seconds": MAX_STIR_SECONDS}
-
-    def path_of(name: str, number: int, draw: Draw) -> Path:
-        shown = as_json({**common, **made_from[name], **draw._asdict()})
-        digest = sha256(shown.encode()).hexdigest()[:12]
-        return calibration.path / MOVING / f"{name}-{number}-{digest}.webp"
-
-    return [
-        Film(name, scene, draw, path_of(name, number, draw))
-        for name, scene in scenes.items()
-        for number, draw in enumerate(draws, start=1)
-    ]
+    shown = as_json({**common, **scene.content, **draw._asdict()})
+    return sha256(shown.encode()).hexdigest()[:12]
 
 
 def _draws(theta: Mapping[str, np.ndarray], seed: int) -> list[Draw]:

@@ -1,6 +1,7 @@
 """report.html: one file that shows a run, without anything from outside it."""
 
 import base64
+import json
 from collections.abc import Callable, Mapping
 from functools import partial
 from importlib.resources import files
@@ -18,12 +19,11 @@ from ..criticism.figures import held_out_plot, pour_residual_plot, residual_plot
 from ..criticism.result import Criticism
 from ..drawing import to_svg
 from ..files import write_text
-from ..inputs.prior import Described
+from ..inputs.settings import PourSettings
 from ..pouring.figures import pour_figure
 from ..pouring.result import Pour
 from ..run.compute import Compute, open_compute
-from ..run.run import REPORT, Run, RunOrPath
-from ..wording import spoken
+from ..run.run import REPORT, RUN_TOML, Run, RunOrPath
 from .facts import held_out_of
 from .prose import prose
 from .warnings import Results
@@ -97,7 +97,7 @@ def written(
             name: figures.get(name) or (one and FIGURES[name](one)) for name, one in given.items()
         },
         films=_films(results, compute) if moving else {},
-        made_with=_made_with(results),
+        made_from=_made_from(results),
         style=(files("bolfi_liquids.data") / STYLE).read_text(encoding="utf-8"),
         record=results.calibration.record,
         run=results.calibration.path,
@@ -152,7 +152,7 @@ def _films(results: Results, compute: Compute) -> dict[str, list[dict[str, str]]
     for film in films_of(results.latest, results.pour, compute):
         if content := film.path.read_bytes():
             each = {"liquid": str(film.draw), "still": _url(_still(content)), "film": _url(content)}
-            shown.setdefault(film.name, []).append(each)
+            shown.setdefault(film.scene.name, []).append(each)
     return shown
 
 
@@ -171,48 +171,15 @@ def _url(content: bytes) -> str:
     return f"data:image/webp;base64,{base64.b64encode(content).decode()}"
 
 
-def _made_with(results: Results) -> dict[str, str]:
-    """Settings, inputs and versions, for a table."""
-    record, rows = results.calibration.record, dict[str, Any]()
-    settings = dict(record["settings"])
-    priors = settings.pop("prior")
-    rows |= settings
-    rows |= {f"prior of {name}": prior_text(one) for name, one in priors.items()}
+def _made_from(results: Results) -> dict[str, str]:
+    """The texts of run.toml, and of what criticism and pour were made from."""
+    run = results.calibration.run
+    made = {RUN_TOML: (run.path / RUN_TOML).read_text(encoding="utf-8")}
     if results.criticism is not None:
-        rows |= {f"criticism: {name}": of for name, of in _criticism_rows(results.criticism)}
+        made["criticism"] = json.dumps(results.criticism.made_from, indent=1)
     if results.pour is not None:
-        of_pour = results.pour.tree.attrs
-        left_out = ("made_from", "summary", "least_viscosity", "map_error")
-        rows |= {f"pour: {name}": of for name, of in of_pour.items() if name not in left_out}
-    hashes = zip(record["files"]["recordings"], record["inputs"]["sha256"], strict=True)
-    rows |= {f"{file}, SHA-256": digest for file, digest in hashes}
-    rows |= record["versions"]
-    return {name: str(value) for name, value in rows.items()}
-
-
-def _criticism_rows(criticism: Criticism) -> list[tuple[str, str]]:
-    """Settings of a criticism, and each of its files with its hash."""
-    made_from = criticism.made_from
-    settings = {"version": made_from["version"], **made_from["settings"]}
-    rows = [
-        (key, ", ".join(map(str, value)) if isinstance(value, list) else str(value))
-        for key, value in settings.items()
-    ]
-    for group in ("held_out", "baseline", "pours", "held_out_pours"):
-        label, given = spoken(group), made_from[group].items()
-        rows += [(f"{label} {name}, SHA-256", digest) for name, digest in given]
-        rows += [] if given else [(label, "none")]
-    return rows
-
-
-def prior_text(described: Described) -> str:
-    """A distribution of run.toml as Python writes it, such as `LogUniform(0.003, 20)`."""
-    values = {
-        name: prior_text(value) if isinstance(value, Mapping) else f"{value:g}"
-        for name, value in described.items()
-        if name != "family"
-    }
-    if set(values) == {"low", "high"}:
-        return f"{described['family']}({values['low']}, {values['high']})"
-    named = ", ".join(f"{name}={value}" for name, value in values.items())
-    return f"{described['family']}({named})"
+        attrs = results.pour.tree.attrs
+        settings = {name: attrs[name] for name in PourSettings.__dataclass_fields__}
+        cups = {"cups": json.loads(attrs["cups"])}
+        made["pour"] = json.dumps(settings | cups, indent=1, default=lambda number: number.item())
+    return made

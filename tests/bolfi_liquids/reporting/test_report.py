@@ -18,7 +18,6 @@ from bolfi_liquids.reporting import films as making
 from bolfi_liquids.reporting.facts import calibration_facts, criticism_facts, fit_facts, pour_facts
 from bolfi_liquids.reporting.films import films_of
 from bolfi_liquids.reporting.prose import prose
-from bolfi_liquids.reporting.report import prior_text
 from bolfi_liquids.run.compute import Compute
 from bolfi_liquids.run.result_file import _parsed
 from bolfi_liquids.run.run import Run
@@ -78,26 +77,6 @@ def test_report_shows_the_runs_numbers(pour, calibration):
     assert calibration.record["inputs"]["sha256"][0] in text
 
 
-@pytest.mark.parametrize(
-    ("described", "text"),
-    [
-        ({"family": "LogUniform", "high": 20.0, "low": 0.003}, "LogUniform(0.003, 20)"),
-        ({"family": "Normal", "loc": 0.5, "scale": 0.1}, "Normal(loc=0.5, scale=0.1)"),
-        (
-            {
-                "family": "TruncatedDistribution",
-                "base_dist": {"family": "Normal", "loc": 0.0, "scale": 1.0},
-                "high": 2.0,
-                "low": 0.0,
-            },
-            "TruncatedDistribution(base_dist=Normal(loc=0, scale=1), high=2, low=0)",
-        ),
-    ],
-)
-def test_a_prior_is_written_as_in_python(described, text):
-    assert prior_text(described) == text
-
-
 @pytest.fixture(scope="module")
 def calibrated(calibration, tmp_path_factory):
     """The report of a run in which no more was done, of as little as it needs."""
@@ -107,11 +86,10 @@ def calibrated(calibration, tmp_path_factory):
     return bl.report(run, moving=False)
 
 
-def test_report_shows_the_priors(calibration, calibrated):
+def test_report_shows_run_toml(calibrated):
     text, _ = read(calibrated)
-    for described in calibration.record["settings"]["prior"].values():
-        assert html.escape(prior_text(described)) in text
-    assert html.escape("{'family'") not in text
+    record = (calibrated.parent / "run.toml").read_text(encoding="utf-8")
+    assert "[settings.prior.viscosity]" in record and record in html.unescape(text)
 
 
 @pytest.fixture
@@ -196,7 +174,7 @@ def test_report_says_below_which_viscosity_liquids_look_alike(calibration, tmp_p
         summary = replace(calibration.summary, below_least_viscosity=share)
         with_numbers(run, below_least_viscosity=share)
         text, _ = read(bl.report(run, moving=False))
-        assert f"{summary.least_viscosity:.3g} Pa s (stir)" in text
+        assert f"below {summary.least_viscosity:.3g} Pa s (stir)" in text
         assert (f"{summary.least_viscosity:.3g} Pa s the simulator" in text) == told
         assert ("30 % of the posterior" in text) == told
 
@@ -296,10 +274,8 @@ def test_page_shows_the_criticism_before_the_pour(criticised):
     assert page.index("Where they differ") < page.index("<h2>The pour")
     how = page[page.index("How this was made") :]
     assert "77 simulations" in how
-    assert "baseline clean.nc, SHA-256" in how
-    assert "abc123" in how
-    assert "criticism: effects" in how
-    assert "camera_delay, camera_tilt" in how and "held out" in how
+    for text in ("clean.nc", "abc123", "camera_delay", "camera_tilt", "held_out"):
+        assert text in how
 
 
 def test_page_without_a_criticism_says_how_to_get_one(calibrated):
