@@ -2,7 +2,7 @@
 
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -82,15 +82,19 @@ class Panels(NamedTuple):
             self.grid.flat[0].legend(handles, labels)
 
 
-def given_or_shown(axes: "Canvas") -> "Canvas":
-    """`axes`; where they are None, an empty figure of pyplot's, which a notebook shows.
+def shown(draw: "Callable[[Canvas], Panels]", axes: "Canvas") -> np.ndarray:
+    """The axes of a plot, drawn in those that are given, or in a figure that a notebook shows.
 
-    Call it before `styled`: pyplot's first import sets what a notebook needs, and the end of that
-    style would unset it.
+    Args:
+        draw: Draws the plot, see `panels`.
+        axes: None makes a figure of pyplot's.
     """
+    # before the style: the first import sets what a notebook needs, and the style's end unsets it
     import matplotlib.pyplot as plt
 
-    return plt.figure(layout="constrained") if axes is None else axes
+    canvas = plt.figure(layout="constrained") if axes is None else axes
+    with styled():
+        return draw(canvas).grid
 
 
 def panels(

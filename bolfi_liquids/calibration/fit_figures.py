@@ -12,10 +12,7 @@ from ..drawing import (
     ORANGE,
     Panels,
     hover,
-    new_figure,
     panels,
-    styled,
-    to_svg,
 )
 
 if TYPE_CHECKING:
@@ -26,12 +23,6 @@ if TYPE_CHECKING:
 
 PLANE_COLOURS = (BLUE, ORANGE)
 HOVER_STRIPS = 60  # parts of a recording whose values are shown under the pointer
-
-
-def inclination_figure(tree: "DataTree") -> str:
-    """The figure of `draw_fit` as SVG."""
-    with styled():
-        return to_svg(draw_fit(tree).figure, "inclination")
 
 
 def draw_fit(tree: "DataTree", axes: "Canvas" = None) -> Panels:
@@ -89,25 +80,24 @@ def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> None:
         )
 
 
-def stroke_figure(tree: "DataTree") -> str:
+def draw_strokes(tree: "DataTree", axes: "Canvas" = None) -> Panels:
     """RMS of recorded less predicted inclination by stroke and plane, a row for each recording;
-    beside it the sd of the predictions. Empty if the strokes are not known."""
-    recorded = tree["recorded"].to_dataset()
-    if "stroke" not in recorded:  # of a run that was made before they were kept
-        return ""
+    beside it the sd of the predictions.
+
+    Args:
+        tree: posterior.nc.
+        axes: Where to draw, see `drawing.panels`.
+    """
+    recorded, predicted = (tree[name].to_dataset() for name in ("recorded", "posterior_predictive"))
     members = np.unique(recorded["recording"])
-    with styled():
-        figure = new_figure(8.6, 2.2 * len(members) + 0.4)
-        grid = figure.subplots(len(members), 1, squeeze=False)[:, 0]
-        for axes, member in zip(grid, members, strict=True):
-            frames = np.flatnonzero(recorded["recording"].to_numpy() == member)
-            parts = (recorded, tree["posterior_predictive"].to_dataset())
-            _draw_strokes(axes, *(part.isel(frame=frames) for part in parts))
-            axes.set_ylabel("RMS [deg]")
-        grid[-1].set_xlabel("stroke")
-        handles, labels = grid[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=3)
-        return to_svg(figure, "by-stroke")
+    drawn = panels(axes, (len(members), 1), (8.6, 2.2 * len(members) + 0.4))
+    for axis, member in zip(drawn.grid[:, 0], members, strict=True):
+        frames = np.flatnonzero(recorded["recording"].to_numpy() == member)
+        _draw_strokes(axis, recorded.isel(frame=frames), predicted.isel(frame=frames))
+        axis.set_ylabel("RMS [deg]")
+    drawn.grid[-1, 0].set_xlabel("stroke")
+    drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
+    return drawn
 
 
 def _draw_strokes(axes: "Axes", recorded: "Dataset", predicted: "Dataset") -> None:

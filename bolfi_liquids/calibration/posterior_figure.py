@@ -14,8 +14,6 @@ from ..drawing import (
     hover_points,
     panels,
     plain_log_ticks,
-    styled,
-    to_svg,
 )
 
 if TYPE_CHECKING:
@@ -29,12 +27,6 @@ LOGARITHMIC_PARAMETERS = ("viscosity",)
 
 CONTOUR_SHARES = (0.9, 0.5)
 """Probability inside each contour."""
-
-
-def posterior_figure(tree: "DataTree") -> str:
-    """The figure of `draw_posterior` as SVG."""
-    with styled():
-        return to_svg(draw_posterior(tree).figure, "posterior")
 
 
 def draw_posterior(tree: "DataTree", ax: "Canvas" = None) -> Panels:

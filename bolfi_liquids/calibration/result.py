@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -123,12 +124,10 @@ class Calibration:
             ValueError: A criticism has added effects; there is no such plot with them.
         """
         self._check_plot("plot_residuals")
-        from ..drawing import given_or_shown, styled
+        from ..drawing import shown
         from .fit_figures import draw_fit
 
-        canvas = given_or_shown(axes)
-        with styled():
-            return draw_fit(self.tree, canvas).grid
+        return shown(partial(draw_fit, self.tree), axes)
 
     def plot_posterior(self, ax: "Axes | None" = None) -> "NDArray[Any]":
         """Contours of the joint posterior; in a figure of its own with the marginals.
@@ -143,12 +142,10 @@ class Calibration:
             ValueError: A criticism has added effects; there is no such plot with them.
         """
         self._check_plot("plot_coefficient")
-        from ..drawing import given_or_shown, styled
+        from ..drawing import shown
         from .posterior_figure import draw_posterior
 
-        canvas = given_or_shown(ax)
-        with styled():
-            return draw_posterior(self.tree, canvas).grid
+        return shown(partial(draw_posterior, self.tree), ax)
 
     def plot_search(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Discrepancy of each simulation in turn, and the parameters that it tried.
@@ -159,12 +156,10 @@ class Calibration:
         Returns:
             The axes.
         """
-        from ..drawing import given_or_shown, styled
+        from ..drawing import shown
         from .search_figure import draw_search
 
-        canvas = given_or_shown(axes)
-        with styled():
-            return draw_search(self.tree, canvas).grid
+        return shown(partial(draw_search, self.tree), axes)
 
     def _check_plot(self, instead: str) -> None:
         if self.added:

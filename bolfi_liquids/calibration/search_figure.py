@@ -12,8 +12,6 @@ from ..drawing import (
     hover_points,
     panels,
     plain_log_ticks,
-    styled,
-    to_svg,
 )
 from ..wording import with_unit
 from .posterior_figure import AXIS_LABELS, LOGARITHMIC_PARAMETERS
@@ -26,12 +24,6 @@ if TYPE_CHECKING:
 
 POSTERIOR_INTERVAL = 0.05, 0.95
 """Quantiles of the posterior between which the panels are shaded."""
-
-
-def search_figure(tree: "DataTree") -> str:
-    """The figure of `draw_search` as SVG."""
-    with styled():
-        return to_svg(draw_search(tree).figure, "search")
 
 
 def draw_search(tree: "DataTree", axes: "Canvas" = None) -> Panels:

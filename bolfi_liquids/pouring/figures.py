@@ -5,15 +5,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drawing import BLUE, INK, ORANGE, hover_points, new_figure, styled, to_svg
+from ..drawing import BLUE, INK, ORANGE, Panels, hover_points, new_figure, panels
 from ..seeds import Phase, generator
 from .spillage import ACTION, RISK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.contour import QuadContourSet
+    from matplotlib.figure import Figure
     from matplotlib.patches import Patch
     from xarray import Dataset, DataTree
+
+    from ..drawing import Canvas
 
 PERCENT_LEVELS = (0, 1, 2, 5, 10, 20, 40, 70, 100)
 """Contour levels of the spilled percentage, denser where little is spilled."""
@@ -33,9 +36,23 @@ CHOICES = {"chosen": (BLUE, "o", "chosen pour"), "plug_in": (ORANGE, "s", "best 
 """Colour, marker and label of the two actions, by their group in pour.nc."""
 
 
-def pour_figure(tree: "DataTree") -> str:
+def map_plot(tree: "DataTree", axes: "Canvas" = None) -> Panels:
+    """Expected spillage over the actions, with the chosen one and the plug-in.
+
+    Args:
+        tree: pour.nc.
+        axes: Where to draw, see `drawing.panels`.
+    """
+    drawn = panels(axes, (1, 1), (4.6, 3.6))
+    axis = drawn.grid[0, 0]
+    drawn.figure.colorbar(draw_expected(axis, tree), ax=axis)
+    drawn.legend(*axis.get_legend_handles_labels())
+    return drawn
+
+
+def pour_figure(tree: "DataTree") -> "Figure":
     """Spillage over the actions, as expected and in a bad case (above), and of the two choices over
-    outcomes (below), as SVG.
+    outcomes (below).
 
     Args:
         tree: pour.nc.
@@ -43,25 +60,24 @@ def pour_figure(tree: "DataTree") -> str:
     actions = tree["actions"].to_dataset()
     spilled = actions["spilled"].to_numpy()
     x, y = action_axes(tree)
-    with styled():
-        figure = new_figure(8.6, 6.4)
-        upper, lower = figure.subfigures(2, 1, height_ratios=(5, 4))
-        expected, bad = upper.subplots(1, 2, sharey=True)
-        shades = draw_expected(expected, tree)
-        handles, labels = expected.get_legend_handles_labels()
-        chosen = place_of(actions, tree["chosen"].attrs)
-        alike = not_surely_worse(spilled, tree.attrs["risk"], chosen)
-        if alike.any():
-            handles.append(dot_actions(expected, x, y, alike))
-            labels.append("not surely worse than the chosen")
-        draw_map(bad, x, y, 100.0 * np.quantile(spilled, BAD_CASE, axis=0))
-        mark_choices(bad, tree)
-        bad.set_title(f"in {100 * BAD_CASE:.0f} % of the draws at most", loc="left")
-        bad.set_xlabel(expected.get_xlabel())
-        upper.colorbar(shades, ax=[expected, bad], label="spilled [%]")
-        upper.legend(handles, labels, loc="outside upper center", ncols=3)
-        draw_outcomes(lower.subplots(), tree)
-        return to_svg(figure, "pour")
+    figure = new_figure(8.6, 6.4)
+    upper, lower = figure.subfigures(2, 1, height_ratios=(5, 4))
+    expected, bad = upper.subplots(1, 2, sharey=True)
+    shades = draw_expected(expected, tree)
+    handles, labels = expected.get_legend_handles_labels()
+    chosen = place_of(actions, tree["chosen"].attrs)
+    alike = not_surely_worse(spilled, tree.attrs["risk"], chosen)
+    if alike.any():
+        handles.append(dot_actions(expected, x, y, alike))
+        labels.append("not surely worse than the chosen")
+    draw_map(bad, x, y, 100.0 * np.quantile(spilled, BAD_CASE, axis=0))
+    mark_choices(bad, tree)
+    bad.set_title(f"in {100 * BAD_CASE:.0f} % of the draws at most", loc="left")
+    bad.set_xlabel(expected.get_xlabel())
+    upper.colorbar(shades, ax=[expected, bad], label="spilled [%]")
+    upper.legend(handles, labels, loc="outside upper center", ncols=3)
+    draw_outcomes(lower.subplots(), tree)
+    return figure
 
 
 def action_axes(tree: "DataTree") -> tuple[NDArray, NDArray]:

@@ -2,26 +2,22 @@
 
 import base64
 import json
-from collections.abc import Callable, Mapping
 from functools import partial
 from importlib.resources import files
 from io import BytesIO
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from ..calibration.fit_figures import inclination_figure, stroke_figure
-from ..calibration.posterior_figure import posterior_figure
-from ..calibration.result import Calibration
-from ..calibration.search_figure import search_figure
+from ..calibration.fit_figures import draw_fit, draw_strokes
+from ..calibration.posterior_figure import draw_posterior
+from ..calibration.search_figure import draw_search
 from ..criticism.effect_figures import coefficient_plot, confusion_plot, score_plot
 from ..criticism.figures import held_out_plot, pour_residual_plot, residual_plot, stroke_plot
 from ..criticism.result import Criticism
-from ..drawing import to_svg
+from ..drawing import styled, to_svg
 from ..files import write_text
 from ..inputs.settings import PourSettings
 from ..pouring.figures import pour_figure
-from ..pouring.result import Pour
 from ..run.compute import Compute, open_compute
 from ..run.run import REPORT, RUN_TOML, Run, RunOrPath
 from .facts import held_out_of
@@ -29,12 +25,11 @@ from .prose import prose
 from .warnings import Results
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ..inference.simulations import Workers
 
 PAGE_TEMPLATE, STYLE = "report.html.jinja", "report.css"
-
-Figures = dict[str, str]
-"""SVG elements by name."""
 
 
 def report(
@@ -65,20 +60,13 @@ def report(
         return written(Results.of(opened), compute, moving=moving)
 
 
-def written(
-    results: Results,
-    compute: Compute,
-    *,
-    moving: bool = True,
-    figures: Mapping[str, Figures] = MappingProxyType({}),
-) -> Path:
+def written(results: Results, compute: Compute, *, moving: bool = True) -> Path:
     """Write RUN/report.html from given results.
 
     Args:
         results: What the run holds.
         compute: Where moving pictures are simulated.
         moving: See `report`.
-        figures: Those that are drawn already, by the names of `FIGURES`.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -89,13 +77,11 @@ def written(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    facts, given = results.facts, {name: getattr(results, name) for name in FIGURES}
+    facts = results.facts
     page = environment.get_template(PAGE_TEMPLATE).render(
         **facts,
         prose=partial(prose, facts=facts),
-        figures={
-            name: figures.get(name) or (one and FIGURES[name](one)) for name, one in given.items()
-        },
+        figures=figures_of(results),
         films=_films(results, compute) if moving else {},
         made_from=_made_from(results),
         style=(files("bolfi_liquids.data") / STYLE).read_text(encoding="utf-8"),
@@ -105,43 +91,38 @@ def written(
     return write_text(results.calibration.path / REPORT, page)
 
 
-def _calibration_figures(calibration: Calibration) -> Figures:
-    tree = calibration.tree
-    return {
-        "inclination": inclination_figure(tree),
-        "by_stroke": stroke_figure(tree),
-        "posterior": posterior_figure(tree),
-        "search": search_figure(tree),
-    }
+def figures_of(results: Results) -> dict[str, str]:
+    """The figures of a page, SVG elements by name."""
+    tree = results.calibration.tree
+    with styled():
+        drawn = {
+            "inclination": draw_fit(tree).figure,
+            "by-stroke": draw_strokes(tree).figure,
+            "posterior": draw_posterior(tree).figure,
+            "search": draw_search(tree).figure,
+        }
+        if results.criticism is not None:
+            drawn |= _criticism_figures(results.criticism)
+        if results.pour is not None:
+            drawn["pour"] = pour_figure(results.pour.tree)
+        return {name: to_svg(figure, name) for name, figure in drawn.items()}
 
 
-def _criticism_figures(criticism: Criticism) -> Figures:
+def _criticism_figures(criticism: Criticism) -> dict[str, "Figure"]:
     tree, accepted = criticism.tree, criticism.summary.accepted
-    stirs, pours = tree.children["stirs"], tree.children.get("pours")
+    sources = {name: tree.children[name] for name in ("stirs", "pours") if name in tree.children}
+    stirs = sources["stirs"]
     drawn = {"residual": residual_plot(stirs), "strokes": stroke_plot(stirs)}
     if accepted:
         drawn["coefficient"] = coefficient_plot(tree, accepted)
     if held_out_of(stirs) is not None:
-        drawn["held_out"] = held_out_plot(stirs)
-    if pours is not None:
-        drawn["pours"] = pour_residual_plot(pours)
-    for name, source in tree.children.items():
-        if name in ("stirs", "pours"):
-            drawn[f"scores_{name}"] = score_plot(source)
-            drawn[f"confusion_{name}"] = confusion_plot(source)
-    return {name: to_svg(of.figure, name) for name, of in drawn.items()}
-
-
-def _pour_figures(pour: Pour) -> Figures:
-    return {"pour": pour_figure(pour.tree)}
-
-
-FIGURES: dict[str, Callable[[Any], Figures]] = {
-    "calibration": _calibration_figures,
-    "criticism": _criticism_figures,
-    "pour": _pour_figures,
-}
-"""Draws the figures of each result."""
+        drawn["held-out"] = held_out_plot(stirs)
+    if "pours" in sources:
+        drawn["pours"] = pour_residual_plot(sources["pours"])
+    for name, source in sources.items():
+        drawn[f"scores-{name}"] = score_plot(source)
+        drawn[f"confusion-{name}"] = confusion_plot(source)
+    return {name: plot.figure for name, plot in drawn.items()}
 
 
 def _films(results: Results, compute: Compute) -> dict[str, list[dict[str, str]]]:

@@ -14,7 +14,8 @@ from bolfi_liquids.criticism.source_summary import PourVerdict, SourceVerdict
 from bolfi_liquids.criticism.summary import SuggestedExperiment
 from bolfi_liquids.reporting.facts import DETECTABLE_SNR, criticism_facts
 from bolfi_liquids.reporting.prose import prose
-from bolfi_liquids.reporting.report import FIGURES
+from bolfi_liquids.reporting.report import figures_of
+from bolfi_liquids.reporting.warnings import Results
 
 EFFECTS = ("camera_delay", "gripper_scale", "stick_mass")
 CIRCLES = SuggestedExperiment("four circles", EFFECTS[:2], 1.0)
@@ -93,9 +94,10 @@ def test_tables_hold_each_number_in_its_unit(criticise):
 
 
 def test_figures_of_an_effect_that_was_named(criticise):
-    drawn = FIGURES["criticism"](criticise())
+    criticism = criticise()
+    drawn = figures_of(Results(criticism.base, criticism, None))
     assert "camera delay [s]" in drawn["coefficient"]
-    assert "RMS of observed less expected [deg]" in drawn["held_out"]
+    assert "RMS of observed less expected [deg]" in drawn["held-out"]
     assert "pours" not in drawn
 
 
@@ -185,7 +187,8 @@ def test_pours_have_their_own_verdict(criticise, said, made):
     assert "pours agree" in of_pours and "5.1 percentage points" in of_pours
     (explained,) = said("poured", tree, stirs=stirs, pours=replace(pours, after=0.02))
     assert "5.1" in explained and "2.0" in explained
-    figures = FIGURES["criticism"](criticise(tree, stirs=stirs, pours=pours))
+    criticism = criticise(tree, stirs=stirs, pours=pours)
+    figures = figures_of(Results(criticism.base, criticism, None))
     for text in ("spilled", "retained", "expected [% of the liquid]", "observed [% of the liquid]"):
         assert f">{text}<" in figures["pours"]
 
