@@ -39,6 +39,7 @@ _STYLE: dict[Any, Any] = {
     "legend.fontsize": 8.5,
 }
 RESOLUTION = 150  # dots per inch of a PNG
+HOVER_STRIPS = 60  # parts of an axis with a text each
 HOVER_SIZE = 9.0  # points, of the place around a mark in which its text is shown
 HOVER = "hover: "
 """Begins the ids of SVG groups whose remaining text a browser shows under the pointer."""
@@ -141,6 +142,20 @@ def hover_points(axes: "Axes", x: "ArrayLike", y: "ArrayLike", texts: Sequence[s
         if np.isfinite(at) and np.isfinite(up):
             (unseen,) = axes.plot(at, up, "o", markersize=HOVER_SIZE, alpha=0.0)
             hover(unseen, text)
+
+
+def hover_strips(axes: "Axes", x: "ArrayLike", text_at: Callable[[int], str]) -> None:
+    """Show texts under the pointer along values of x, shape (n,), ascending.
+
+    Args:
+        axes: Over whose whole height they are shown.
+        x: Where something is drawn.
+        text_at: The text of an index of x; that in the middle of each strip is taken.
+    """
+    values = np.asarray(x, float)
+    for part in np.array_split(np.arange(len(values)), min(HOVER_STRIPS, len(values))):
+        start, stop = values[part[0]], values[min(part[-1] + 1, len(values) - 1)]
+        hover(axes.axvspan(start, stop, alpha=0.0), text_at(part[len(part) // 2]))
 
 
 def to_svg(figure: "Figure", name: str) -> str:

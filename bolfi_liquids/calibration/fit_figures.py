@@ -12,6 +12,7 @@ from ..drawing import (
     ORANGE,
     Panels,
     hover,
+    hover_strips,
     panels,
 )
 
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from ..drawing import Canvas
 
 PLANE_COLOURS = (BLUE, ORANGE)
-HOVER_STRIPS = 60  # parts of a recording whose values are shown under the pointer
 
 
 def draw_fit(tree: "DataTree", axes: "Canvas" = None) -> Panels:
@@ -71,13 +71,14 @@ def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> None:
     axes.plot(time, degrees["closest"], color=ORANGE, linewidth=1.1, label="closest hypothesis")
     axes.plot(time, degrees["recorded"], color=INK, linewidth=0.9, label="recorded")
     axes.axhline(0.0, color=LIGHT, linewidth=0.8, zorder=0)
-    for frames in np.array_split(np.arange(len(time)), min(HOVER_STRIPS, len(time))):
-        at, last = frames[len(frames) // 2], min(frames[-1] + 1, len(time) - 1)
-        hover(
-            axes.axvspan(float(time[frames[0]]), float(time[last]), alpha=0.0),
+
+    def text_at(at: int) -> str:
+        return (
             f"{time[at]:.2f} s: recorded {degrees['recorded'][at]:.2f}°, closest "
-            f"{degrees['closest'][at]:.2f}°, predicted {low[at]:.2f}° to {high[at]:.2f}°",
+            f"{degrees['closest'][at]:.2f}°, predicted {low[at]:.2f}° to {high[at]:.2f}°"
         )
+
+    hover_strips(axes, time, text_at)
 
 
 def draw_strokes(tree: "DataTree", axes: "Canvas" = None) -> Panels:

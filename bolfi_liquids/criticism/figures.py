@@ -13,6 +13,7 @@ from ..drawing import (
     LIGHT,
     ORANGE,
     Panels,
+    hover_strips,
     panels,
 )
 from ..inputs.settings import FALSE_ALARM_RATE
@@ -69,9 +70,17 @@ def _draw_residual(axes: "Axes", part: "Dataset") -> None:
         time, -width, width, color=GREY, alpha=0.3, linewidth=0, label="±2 sd of noise and model"
     )
     axes.axhline(0.0, color=GREY, linewidth=0.8)
+    left = {
+        when: np.degrees((part["observed"] - part[f"expected_{when}"]).to_numpy()) for when in drawn
+    }
     for when, (colour, label) in drawn.items():
-        left = np.degrees((part["observed"] - part[f"expected_{when}"]).to_numpy())
-        axes.plot(time, left, color=colour, linewidth=1.2, label=label)
+        axes.plot(time, left[when], color=colour, linewidth=1.2, label=label)
+
+    def text_at(at: int) -> str:
+        values = (f"{MODEL_STYLES[when][1]} {angle[at]:.2f}°" for when, angle in left.items())
+        return f"{time[at]:.2f} s: {', '.join(values)}"
+
+    hover_strips(axes, time, text_at)
 
 
 def _shade(axes: "Axes", strokes: "Dataset") -> None:
