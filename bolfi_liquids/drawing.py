@@ -134,13 +134,14 @@ def panels(
 def hover(artist: "Artist", text: str) -> None:
     """Show a text while the pointer is over an artist, where `to_svg` writes its figure."""
     artist.set_gid(HOVER + text)
+    artist.set_in_layout(False)  # which would measure hundreds of them again and again
 
 
 def hover_points(axes: "Axes", x: "ArrayLike", y: "ArrayLike", texts: Sequence[str]) -> None:
     """Show texts under the pointer near points, all of shape (n,); none where one is not finite."""
     for at, up, text in zip(np.asarray(x), np.asarray(y), texts, strict=True):
         if np.isfinite(at) and np.isfinite(up):
-            (unseen,) = axes.plot(at, up, "o", markersize=HOVER_SIZE, alpha=0.0)
+            (unseen,) = axes.plot(at, up, "o", color=INK, markersize=HOVER_SIZE, alpha=0.0)
             hover(unseen, text)
 
 
