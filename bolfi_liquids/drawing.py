@@ -172,7 +172,8 @@ def to_svg(figure: "Figure", name: str) -> str:
     svg = text.getvalue()
     # HTML needs neither the XML prologue nor namespaces, and readers no links to standards
     whole = _OUTSIDE.sub("", svg[svg.index("<svg") :]).strip()
-    return _HOVER_GROUP.sub(r"<g><title>\2</title>", whole)
+    # what is not painted would not meet the pointer
+    return _HOVER_GROUP.sub(r'<g pointer-events="all"><title>\2</title>', whole)
 
 
 def write_figure(figure: "Figure", out: Path, name: str) -> None:

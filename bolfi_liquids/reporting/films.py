@@ -23,7 +23,7 @@ from ..progress import progress_bar
 from ..run.compute import HERE, Compute
 from ..run.run import MOVING, as_json
 from ..seeds import Phase, simulation_seeds
-from ..wording import with_unit
+from ..wording import spoken, with_unit
 
 if TYPE_CHECKING:
     from ..calibration.result import Calibration
@@ -47,8 +47,8 @@ class Draw(NamedTuple):
     seed: int
 
     def __str__(self) -> str:
-        shown = {**self.liquid, **self.effects}
-        return ", ".join(f"{name} {with_unit(name, value)}" for name, value in shown.items())
+        shown = {**self.liquid, **self.effects}.items()
+        return ", ".join(f"{spoken(name)} {with_unit(name, value)}" for name, value in shown)
 
 
 class StirScene(NamedTuple):

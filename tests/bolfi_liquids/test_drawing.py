@@ -8,7 +8,7 @@ import pytest
 
 from bolfi_liquids.drawing import hover, hover_points, new_figure, plain_log_ticks, styled, to_svg
 
-TITLE = re.compile(r"<g><title>([^<]*)</title>(.*?)</g>", re.DOTALL)
+TITLE = re.compile(r"<g[^>]*><title>([^<]*)</title>(.*?)</g>", re.DOTALL)
 PLACE = re.compile(r'<use [^>]*x="([\d.]+)" y="([\d.]+)"')
 
 
