@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from importlib.resources import as_file, files
 from itertools import pairwise
@@ -18,7 +18,7 @@ from .inputs.open import open_recording
 from .inputs.settings import CalibrationSettings, PourSettings
 from .models import runtime
 from .pouring.choose import choose_pour, decided
-from .reporting.report import CHAPTERS, written
+from .reporting.report import written
 from .reporting.warnings import Results
 from .run.run import RUN_TOML, Run
 
@@ -60,8 +60,8 @@ def run_demo(
 ) -> Demo:
     """Calibrate on the bundled recording, find what is hidden in it, pour and write the report.
 
-    With an executor, the pour before criticism and the report's chapters are made in a thread
-    beside the next simulations. A second call takes everything that was simulated from the run.
+    With an executor, the pour before criticism is chosen in a thread beside the next
+    simulations. A second call takes everything that was simulated from the run.
 
     Args:
         out: The RUN directory.
@@ -85,13 +85,6 @@ def run_demo(
         workers = compute.executor
         where: dict[str, Any] = {"executor": workers, "timeout": compute.timeout}
 
-        def beside(make: Callable[..., Any], *given: Any) -> Future[Any]:
-            if workers is not None:
-                return thread.submit(make, *given)
-            made: Future[Any] = Future()  # Taichi stays in this thread
-            made.set_result(make(*given))
-            return made
-
         if workers is not None:  # they load Taichi while this process loads JAX
             for _ in range(2):
                 workers.submit(runtime.start)
@@ -102,17 +95,16 @@ def run_demo(
         fitted(calibration)
         # the fit is bad, and without criticism nobody should pour after it
         few = PourSettings(budget=POURS)
-        before = beside(decided, calibration, bundled_cups(), few, compute)
-        chapter = beside(CHAPTERS["calibration"], calibration)
+        decision = calibration, bundled_cups(), few, compute
+        before = None if workers is None else thread.submit(decided, *decision)
         criticism = criticise(calibration, held_out=held_out, baseline=clean, **where)
-        found = beside(CHAPTERS["criticism"], criticism)
-        pour_before = before.result()
+        # Taichi stays in this thread where there are no workers
+        pour_before = decided(*decision) if before is None else before.result()
         ends["criticise, pour before it"] = time.perf_counter()
         pour = choose_pour(criticism, budget=POURS, **where)
         ends["pour"] = time.perf_counter()
-        chapters = {"calibration": chapter.result(), "criticism": found.result()}
         with Run.entered(out) as run:
-            page = written(Results.of(run), compute, chapters=chapters)
+            page = written(Results.of(run), compute)
         ends["report"] = time.perf_counter()
     seconds = {phase: end - before for (_, before), (phase, end) in pairwise(ends.items())}
     return Demo(calibration, criticism, pour, pour_before, page, seconds)

@@ -2,6 +2,7 @@
 
 import io
 import re
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -11,6 +12,7 @@ import numpy as np
 from .files import write_whole
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
@@ -37,6 +39,12 @@ _STYLE: dict[Any, Any] = {
     "legend.fontsize": 8.5,
 }
 RESOLUTION = 150  # dots per inch of a PNG
+HOVER_STRIPS = 60  # parts of an axis with a text each
+HOVER_SIZE = 9.0  # points, of the place around a mark in which its text is shown
+HOVER = "hover: "
+"""Begins the ids of SVG groups whose remaining text a browser shows under the pointer."""
+
+_HOVER_GROUP = re.compile(rf"<g id=([\"']){HOVER}(.*?)\1>")
 _OUTSIDE = re.compile(r"<metadata>.*?</metadata>|\sxmlns(?::\w+)?=\"[^\"]*\"", re.DOTALL)
 
 
@@ -75,15 +83,19 @@ class Panels(NamedTuple):
             self.grid.flat[0].legend(handles, labels)
 
 
-def given_or_shown(axes: "Canvas") -> "Canvas":
-    """`axes`; where they are None, an empty figure of pyplot's, which a notebook shows.
+def shown(draw: "Callable[[Canvas], Panels]", axes: "Canvas") -> np.ndarray:
+    """The axes of a plot, drawn in those that are given, or in a figure that a notebook shows.
 
-    Call it before `styled`: pyplot's first import sets what a notebook needs, and the end of that
-    style would unset it.
+    Args:
+        draw: Draws the plot, see `panels`.
+        axes: None makes a figure of pyplot's.
     """
+    # before the style: the first import sets what a notebook needs, and the style's end unsets it
     import matplotlib.pyplot as plt
 
-    return plt.figure(layout="constrained") if axes is None else axes
+    canvas = plt.figure(layout="constrained") if axes is None else axes
+    with styled():
+        return draw(canvas).grid
 
 
 def panels(
@@ -119,8 +131,36 @@ def panels(
     return Panels(given.flat[0].figure, given.reshape(shape), False)
 
 
+def hover(artist: "Artist", text: str) -> None:
+    """Show a text while the pointer is over an artist, where `to_svg` writes its figure."""
+    artist.set_gid(HOVER + text)
+    artist.set_in_layout(False)  # which would measure hundreds of them again and again
+
+
+def hover_points(axes: "Axes", x: "ArrayLike", y: "ArrayLike", texts: Sequence[str]) -> None:
+    """Show texts under the pointer near points, all of shape (n,); none where one is not finite."""
+    for at, up, text in zip(np.asarray(x), np.asarray(y), texts, strict=True):
+        if np.isfinite(at) and np.isfinite(up):
+            (unseen,) = axes.plot(at, up, "o", color=INK, markersize=HOVER_SIZE, alpha=0.0)
+            hover(unseen, text)
+
+
+def hover_strips(axes: "Axes", x: "ArrayLike", text_at: Callable[[int], str]) -> None:
+    """Show texts under the pointer along values of x, shape (n,), ascending.
+
+    Args:
+        axes: Over whose whole height they are shown.
+        x: Where something is drawn.
+        text_at: The text of an index of x; that in the middle of each strip is taken.
+    """
+    values = np.asarray(x, float)
+    for part in np.array_split(np.arange(len(values)), min(HOVER_STRIPS, len(values))):
+        start, stop = values[part[0]], values[min(part[-1] + 1, len(values) - 1)]
+        hover(axes.axvspan(start, stop, alpha=0.0), text_at(part[len(part) // 2]))
+
+
 def to_svg(figure: "Figure", name: str) -> str:
-    """A figure as an SVG element for an HTML page.
+    """A figure as an SVG element for an HTML page, with what `hover` shows as SVG titles.
 
     Args:
         figure: Drawn under `styled`.
@@ -131,7 +171,9 @@ def to_svg(figure: "Figure", name: str) -> str:
         figure.savefig(text, format="svg", transparent=True)
     svg = text.getvalue()
     # HTML needs neither the XML prologue nor namespaces, and readers no links to standards
-    return _OUTSIDE.sub("", svg[svg.index("<svg") :]).strip()
+    whole = _OUTSIDE.sub("", svg[svg.index("<svg") :]).strip()
+    # what is not painted would not meet the pointer
+    return _HOVER_GROUP.sub(r'<g pointer-events="all"><title>\2</title>', whole)
 
 
 def write_figure(figure: "Figure", out: Path, name: str) -> None:

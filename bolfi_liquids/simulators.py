@@ -17,7 +17,7 @@ from .inputs.recording import Recording
 
 if TYPE_CHECKING:
     from .inference.types import Discrepancy
-    from .models import Cups, PourBatch, StirFrames, StirSetup
+    from .models import Cups, PourBatch, PourFrames, StirFrames, StirSetup
 
 RATE = "angular_velocity"
 """Of the source [rad/s], among the parameters of a pour."""
@@ -228,6 +228,12 @@ class PourSimulator(FluidSimulator):
         liquid, effects = split_parameters({k: v for k, v in theta.items() if k != RATE})
         named = models.Liquid(**liquid, density=self.density)
         return models.PourBatch(named, theta[RATE], self.cups, seeds, self.particles, effects)
+
+    def frames(self, theta: Mapping[str, float], seed: int, rate: float) -> "PourFrames":
+        """What one pour looks like, `rate` times a second, whatever is kept of it."""
+        from . import models
+
+        return models.pour_frames(self.batch(theta, [seed]), rate=rate)
 
     @property
     def identity(self) -> str:

@@ -1,18 +1,9 @@
-"""Words that the terminal, the report and the figures share: names, units, numbers, sentences.
-
-A sentence is a key and values. Its wording is a Jinja macro of that name in
-`data/SUBJECT_sentences.jinja`, so that code and tests speak of conditions and never of wording.
-"""
+"""Words that the terminal, the report and the figures share: names, units and numbers."""
 
 import shlex
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from functools import cache
 from html import escape
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
+from typing import Any
 
 LIQUID_UNITS = {"viscosity": "Pa s"}
 """Units of the liquid's parameters; the others are dimensionless."""
@@ -79,56 +70,3 @@ def html_table(title: str, rows: Mapping[str, Any]) -> str:
         for name, value in rows.items()
     )
     return f"<table><caption>{escape(title)}</caption>{cells}</table>"
-
-
-@dataclass(frozen=True)
-class Sentence:
-    """What is to be written, before it is put into words.
-
-    `str(sentence)` is its wording, in a page as on a terminal.
-
-    Attributes:
-        key: SUBJECT.NAME: the macro NAME of `data/SUBJECT_sentences.jinja`.
-        values: The macro's arguments by name.
-    """
-
-    key: str
-    values: Mapping[str, Any]
-
-    def __str__(self) -> str:
-        subject, _, name = self.key.partition(".")
-        macro = getattr(wordings(subject), name)
-        return " ".join(macro(**self.values).split())
-
-
-def sentence(key: str, **values: Any) -> Sentence:
-    """The sentence of this key with these values."""
-    return Sentence(key, values)
-
-
-@cache
-def wordings(subject: str) -> Any:
-    """The macros of a subject's sentences, as attributes."""
-    return _environment().get_template(f"{subject}_sentences.jinja").module
-
-
-@cache
-def _environment() -> "Environment":
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("bolfi_liquids", "data"),
-        autoescape=False,  # a page escapes the whole sentence
-        undefined=StrictUndefined,
-    )
-    environment.filters |= {
-        "spoken": spoken,
-        "listed": listed,
-        "percent": percent,
-        "spilled": spilled,
-        "at_most": at_most,
-        "digits": lambda value, count=2: f"{value:.{count}g}",
-        "fixed": lambda value, decimals=2: f"{value:.{decimals}f}",
-        "of": lambda value, name: with_unit(name, value),
-    }
-    return environment

@@ -11,11 +11,10 @@ from ..drawing import (
     LIGHT,
     ORANGE,
     Panels,
-    new_figure,
+    hover,
+    hover_strips,
     panels,
-    styled,
 )
-from ..hover_labels import Readout, series, to_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,14 +25,7 @@ if TYPE_CHECKING:
 PLANE_COLOURS = (BLUE, ORANGE)
 
 
-def inclination_figure(tree: "DataTree") -> str:
-    """The chart of `draw_fit`, for a page."""
-    with styled():
-        drawn, readouts = draw_fit(tree)
-        return to_chart(drawn.figure, "inclination", readouts)
-
-
-def draw_fit(tree: "DataTree", axes: "Canvas" = None) -> tuple[Panels, list[Readout]]:
+def draw_fit(tree: "DataTree", axes: "Canvas" = None) -> Panels:
     """Inclination against time: recorded, closest hypothesis and posterior prediction.
 
     One row of axes for each recording, one column for each plane.
@@ -46,7 +38,6 @@ def draw_fit(tree: "DataTree", axes: "Canvas" = None) -> tuple[Panels, list[Read
     members = np.unique(recorded["recording"])
     size = 8.6, 2.6 * len(members) + 0.4
     drawn = panels(axes, (len(members), 2), size, sharex="row", sharey=True)
-    readouts = []
     for row, member in zip(drawn.grid, members, strict=True):
         frames = np.flatnonzero(recorded["recording"].to_numpy() == member)
         for axis, plane in zip(row, recorded["plane"].to_numpy(), strict=True):
@@ -54,18 +45,16 @@ def draw_fit(tree: "DataTree", axes: "Canvas" = None) -> tuple[Panels, list[Read
                 name: tree[name].to_dataset().sel(plane=plane).isel(frame=frames)
                 for name in ("recorded", "closest", "posterior_predictive")
             }
-            readout = _draw_inclination(axis, part)
-            readout.content.update(plane=str(plane), recording=int(member))
-            readouts.append(readout)
+            _draw_inclination(axis, part)
             axis.set_title(f"{plane} plane", loc="left")
         row[0].set_ylabel("inclination [deg]")
     for axis in drawn.grid[-1]:
         axis.set_xlabel("time [s]")
     drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
-    return drawn, readouts
+    return drawn
 
 
-def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> Readout:
+def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> None:
     time = part["recorded"]["time"].to_numpy()
     degrees = {name: np.degrees(data["inclination"].to_numpy()) for name, data in part.items()}
     predicted = degrees["posterior_predictive"].reshape(-1, len(time))
@@ -82,56 +71,53 @@ def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> Readout:
     axes.plot(time, degrees["closest"], color=ORANGE, linewidth=1.1, label="closest hypothesis")
     axes.plot(time, degrees["recorded"], color=INK, linewidth=0.9, label="recorded")
     axes.axhline(0.0, color=LIGHT, linewidth=0.8, zorder=0)
-    lines = {
-        "recorded": degrees["recorded"],
-        "closest": degrees["closest"],
-        "predicted, least": low,
-        "predicted, most": high,
-    }
-    return series(axes, time, lines)
+
+    def text_at(at: int) -> str:
+        return (
+            f"{time[at]:.2f} s: recorded {degrees['recorded'][at]:.2f}°, closest "
+            f"{degrees['closest'][at]:.2f}°, predicted {low[at]:.2f}° to {high[at]:.2f}°"
+        )
+
+    hover_strips(axes, time, text_at)
 
 
-def stroke_figure(tree: "DataTree") -> str:
+def draw_strokes(tree: "DataTree", axes: "Canvas" = None) -> Panels:
     """RMS of recorded less predicted inclination by stroke and plane, a row for each recording;
-    beside it the sd of the predictions. Empty if the strokes are not known."""
-    recorded = tree["recorded"].to_dataset()
-    if "stroke" not in recorded:  # of a run that was made before they were kept
-        return ""
+    beside it the sd of the predictions.
+
+    Args:
+        tree: posterior.nc.
+        axes: Where to draw, see `drawing.panels`.
+    """
+    recorded, predicted = (tree[name].to_dataset() for name in ("recorded", "posterior_predictive"))
     members = np.unique(recorded["recording"])
-    readouts = []
-    with styled():
-        figure = new_figure(8.6, 2.2 * len(members) + 0.4)
-        grid = figure.subplots(len(members), 1, squeeze=False)[:, 0]
-        for axes, member in zip(grid, members, strict=True):
-            frames = np.flatnonzero(recorded["recording"].to_numpy() == member)
-            parts = (recorded, tree["posterior_predictive"].to_dataset())
-            readouts.append(_draw_strokes(axes, *(part.isel(frame=frames) for part in parts)))
-            axes.set_ylabel("RMS [deg]")
-        grid[-1].set_xlabel("stroke")
-        handles, labels = grid[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=3)
-        return to_chart(figure, "by-stroke", readouts)
+    drawn = panels(axes, (len(members), 1), (8.6, 2.2 * len(members) + 0.4))
+    for axis, member in zip(drawn.grid[:, 0], members, strict=True):
+        frames = np.flatnonzero(recorded["recording"].to_numpy() == member)
+        _draw_strokes(axis, recorded.isel(frame=frames), predicted.isel(frame=frames))
+        axis.set_ylabel("RMS [deg]")
+    drawn.grid[-1, 0].set_xlabel("stroke")
+    drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
+    return drawn
 
 
-def _draw_strokes(axes: "Axes", recorded: "Dataset", predicted: "Dataset") -> Readout:
+def _draw_strokes(axes: "Axes", recorded: "Dataset", predicted: "Dataset") -> None:
     numbers = recorded["stroke"].to_numpy()
     strokes = np.unique(numbers)
     seen = np.degrees(recorded["inclination"].to_numpy())
     shown = np.degrees(predicted["inclination"].to_numpy()).reshape(-1, *seen.shape)
     left, spread = seen - shown.mean(axis=0), shown.std(axis=0, ddof=1)
-    lines = {}
     for at, plane in enumerate(recorded["plane"].to_numpy()):
         rms = _rms_by(numbers, left[:, at])
         place = np.arange(len(strokes)) + 0.4 * (at - 0.5)
-        axes.bar(place, rms, 0.36, color=PLANE_COLOURS[at], label=f"{plane} plane")
-        lines[f"{plane} plane"] = rms
+        bars = axes.bar(place, rms, 0.36, color=PLANE_COLOURS[at], label=f"{plane} plane")
+        for bar, number, height in zip(bars, strokes, rms, strict=True):
+            hover(bar, f"stroke {number}, {plane} plane: {height:.2f}°")
     usual = _rms_by(numbers, spread)
     axes.step(np.arange(-1, len(strokes) + 1), np.pad(usual, 1, mode="edge"), where="mid",
               color=INK, lw=1.0, label="sd of the predictions")  # fmt: skip
     axes.set_xlim(-0.6, len(strokes) - 0.4)
     axes.set_xticks(range(len(strokes)), [str(number) for number in strokes])
-    return series(axes, np.arange(len(strokes)), {**lines, "sd of the predictions": usual},
-                  names=[f"stroke {number}" for number in strokes])  # fmt: skip
 
 
 def _rms_by(numbers: NDArray, values: NDArray) -> NDArray[np.float64]:

@@ -11,11 +11,10 @@ from ..drawing import (
     INK,
     ORANGE,
     Panels,
+    hover_points,
     panels,
     plain_log_ticks,
-    styled,
 )
-from ..hover_labels import Readout, marks, to_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,14 +29,7 @@ CONTOUR_SHARES = (0.9, 0.5)
 """Probability inside each contour."""
 
 
-def posterior_figure(tree: "DataTree") -> str:
-    """The chart of `draw_posterior`, for a page."""
-    with styled():
-        drawn, simulated = draw_posterior(tree)
-        return to_chart(drawn.figure, "posterior", [simulated])
-
-
-def draw_posterior(tree: "DataTree", ax: "Canvas" = None) -> tuple[Panels, Readout]:
+def draw_posterior(tree: "DataTree", ax: "Canvas" = None) -> Panels:
     """Contours of the joint posterior, in a figure of its own with marginals and the prior's.
 
     Args:
@@ -58,9 +50,9 @@ def draw_posterior(tree: "DataTree", ax: "Canvas" = None) -> tuple[Panels, Reado
         drawn = panels(ax, (1, 1), (4.6, 3.6))
     joint = drawn.grid[-1, 0]
     _draw_joint(joint, surface, posterior, axes_of)
-    simulated = _mark(joint, tree, (first, second))
+    _mark(joint, tree, (first, second))
     _finish(drawn, joint, (first, second))
-    return drawn, simulated
+    return drawn
 
 
 def _draw_marginals(
@@ -135,7 +127,7 @@ def _draw_joint(
     joint.contour(x, y, density.T, levels=levels, colors=BLUE, linewidths=1.0)
 
 
-def _mark(joint: "Axes", tree: "DataTree", names: tuple[str, str]) -> Readout:
+def _mark(joint: "Axes", tree: "DataTree", names: tuple[str, str]) -> None:
     simulations, closest = tree["simulations"], tree["closest"]
     x, y = (simulations[name].to_numpy() for name in names)
     joint.plot(x, y, ".", color=GREY, markersize=4, label="simulated")
@@ -145,7 +137,7 @@ def _mark(joint: "Axes", tree: "DataTree", names: tuple[str, str]) -> Readout:
         f"simulation {number}: {names[0]} {first:.3g}, {names[1]} {second:.3g}"
         for number, (first, second) in enumerate(zip(x, y, strict=True), start=1)
     ]
-    return marks(joint, x, y, texts, parameters=names)
+    hover_points(joint, x, y, texts)
 
 
 def _finish(drawn: Panels, joint: "Axes", names: tuple[str, str]) -> None:

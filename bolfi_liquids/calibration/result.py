@@ -3,13 +3,14 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
 from ..run.run import Run, RunOrPath, key_of
-from ..wording import html_table, with_unit
+from ..wording import html_table
 from .bad_fit import bad_fit
 from .draws import pick_draws
 from .summary import CalibrationSummary
@@ -39,23 +40,18 @@ class Calibration:
     summary: CalibrationSummary
 
     def __repr__(self) -> str:
-        rows = ", ".join(f"{name} {text}" for name, text in self._quantiles().items())
+        parameters = self.summary.parameters.items()
+        rows = ", ".join(f"{name} {of.interval(name)}" for name, of in parameters)
         fit = "" if bad_fit(self.summary) is None else f", fit {self.summary.fit_status}"
         return f"Calibration({str(self.path)!r}: {rows}; {self.summary.sampler_status}{fit})"
 
     def _repr_html_(self) -> str:
         status = self.summary.sampler_status
-        rows = {"run": self.path, **self._quantiles(), "sampler": status, "next": status.advice}
+        parameters = {name: of.interval(name) for name, of in self.summary.parameters.items()}
+        rows = {"run": self.path, **parameters, "sampler": status, "next": status.advice}
         if (bad := bad_fit(self.summary)) is not None:
             rows["warning"] = bad
-        return html_table("Calibration (median, 5 % to 95 %)", rows)
-
-    def _quantiles(self) -> dict[str, str]:
-        """Median, and 5 % to 95 % of the posterior, by parameter."""
-        return {
-            name: f"{with_unit(name, s.q50)} ({s.q05:.3g} to {s.q95:.3g})"
-            for name, s in self.summary.parameters.items()
-        }
+        return html_table("Calibration", rows)
 
     @classmethod
     def open(cls, run: RunOrPath) -> "Calibration":
@@ -131,12 +127,10 @@ class Calibration:
             ValueError: A criticism has added effects; there is no such plot with them.
         """
         self._check_plot("plot_residuals")
-        from ..drawing import given_or_shown, styled
+        from ..drawing import shown
         from .fit_figures import draw_fit
 
-        canvas = given_or_shown(axes)
-        with styled():
-            return draw_fit(self.tree, canvas)[0].grid
+        return shown(partial(draw_fit, self.tree), axes)
 
     def plot_posterior(self, ax: "Axes | None" = None) -> "NDArray[Any]":
         """Contours of the joint posterior; in a figure of its own with the marginals.
@@ -151,12 +145,10 @@ class Calibration:
             ValueError: A criticism has added effects; there is no such plot with them.
         """
         self._check_plot("plot_coefficient")
-        from ..drawing import given_or_shown, styled
+        from ..drawing import shown
         from .posterior_figure import draw_posterior
 
-        canvas = given_or_shown(ax)
-        with styled():
-            return draw_posterior(self.tree, canvas)[0].grid
+        return shown(partial(draw_posterior, self.tree), ax)
 
     def plot_search(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Discrepancy of each simulation in turn, and the parameters that it tried.
@@ -167,12 +159,10 @@ class Calibration:
         Returns:
             The axes.
         """
-        from ..drawing import given_or_shown, styled
+        from ..drawing import shown
         from .search_figure import draw_search
 
-        canvas = given_or_shown(axes)
-        with styled():
-            return draw_search(self.tree, canvas)[0].grid
+        return shown(partial(draw_search, self.tree), axes)
 
     def _check_plot(self, instead: str) -> None:
         if self.added:

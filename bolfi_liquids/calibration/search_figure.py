@@ -9,11 +9,10 @@ from ..drawing import (
     BLUE,
     GREY,
     Panels,
+    hover_points,
     panels,
     plain_log_ticks,
-    styled,
 )
-from ..hover_labels import Readout, marks, to_chart
 from ..wording import with_unit
 from .posterior_figure import AXIS_LABELS, LOGARITHMIC_PARAMETERS
 
@@ -27,14 +26,7 @@ POSTERIOR_INTERVAL = 0.05, 0.95
 """Quantiles of the posterior between which the panels are shaded."""
 
 
-def search_figure(tree: "DataTree") -> str:
-    """The chart of `draw_search`, for a page."""
-    with styled():
-        drawn, readouts = draw_search(tree)
-        return to_chart(drawn.figure, "search", readouts)
-
-
-def draw_search(tree: "DataTree", axes: "Canvas" = None) -> tuple[Panels, list[Readout]]:
+def draw_search(tree: "DataTree", axes: "Canvas" = None) -> Panels:
     """Discrepancy of each simulation in turn with the least so far, and below it the parameters
     that it tried, before the posterior; the start design is hollow.
 
@@ -57,13 +49,13 @@ def draw_search(tree: "DataTree", axes: "Canvas" = None) -> tuple[Panels, list[R
     first, *others = drawn.grid[:, 0]
     least = np.fmin.accumulate(discrepancy)
     first.step(iteration, least, where="post", color=GREY, linewidth=1.0, label="least so far")
-    readouts = [_dots(first, iteration, discrepancy, start, texts)]
+    _dots(first, iteration, discrepancy, start, texts)
     plain_log_ticks(first, "y")
     first.set_ylabel("discrepancy [deg² s]")
     for axis, name in zip(others, names, strict=True):
         low, high = np.quantile(tree["posterior"][name].to_numpy(), POSTERIOR_INTERVAL)
         axis.axhspan(low, high, color=BLUE, alpha=0.15, linewidth=0, label="posterior, 90 %")
-        readouts.append(_dots(axis, iteration, simulations[name].to_numpy(), start, texts))
+        _dots(axis, iteration, simulations[name].to_numpy(), start, texts)
         axis.set_ylabel(AXIS_LABELS.get(name, name))
         if name in LOGARITHMIC_PARAMETERS:
             plain_log_ticks(axis, "y")
@@ -72,11 +64,11 @@ def draw_search(tree: "DataTree", axes: "Canvas" = None) -> tuple[Panels, list[R
     handles, labels = first.get_legend_handles_labels()
     more, more_labels = others[0].get_legend_handles_labels()
     drawn.legend([*handles, more[0]], [*labels, more_labels[0]], ncols=4)
-    return drawn, readouts
+    return drawn
 
 
 def _texts(names: list[str], simulations: "Dataset", discrepancy: NDArray) -> list[str]:
-    """What is said of each simulation."""
+    """Parameters and discrepancy of each simulation."""
     tried = [simulations[name].to_numpy() for name in names]
     return [
         f"simulation {at + 1}: "
@@ -91,7 +83,7 @@ def _texts(names: list[str], simulations: "Dataset", discrepancy: NDArray) -> li
 
 def _dots(
     axes: "Axes", iteration: NDArray, values: NDArray, start: NDArray, texts: list[str]
-) -> Readout:
+) -> None:
     for chosen, face, label in (
         (start, "white", "start design"),
         (~start, BLUE, "engine's choice"),
@@ -105,4 +97,4 @@ def _dots(
             markerfacecolor=face,
             label=label,
         )
-    return marks(axes, iteration, values, texts)
+    hover_points(axes, iteration, values, texts)

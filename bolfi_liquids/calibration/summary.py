@@ -13,6 +13,7 @@ from ..inputs.frame import named_faults
 from ..models import stirring_error
 from ..run.summary import Number, Section
 from ..simulators import StirSimulator
+from ..wording import with_unit
 from .check import PosteriorCheck
 from .model_error import ModelError
 from .noise import irreducible_rms, rms
@@ -70,6 +71,10 @@ class ParameterSummary:
     q05: Number
     q50: Number
     q95: Number
+
+    def interval(self, name: str) -> str:
+        """Median and 90 % interval of the parameter of this name."""
+        return f"{with_unit(name, self.q50)} (90 %: {self.q05:.3g} to {self.q95:.3g})"
 
     @classmethod
     def of(cls, draws: "DataArray") -> Self:

@@ -110,16 +110,13 @@ def record(
 
     The exit status is 3 where something ended the recording early; what there is was kept.
     """
-    from rich.console import Console
-
     from ..calibration.result import Calibration
     from ..inputs.rigs import rig_of
     from ..online.record import record_online
     from ..reporting.warnings import Results
     from ..robot.record import dry_stir
     from ..robot.record import record as run_record
-    from .printed import print_calibration, print_warnings
-    from .tables import print_recording
+    from .printed import print_calibration, print_recording, print_warnings
 
     opened = rig_of(rig)
     if not (moved.arm or moved.emulator):
@@ -133,7 +130,7 @@ def record(
             recording = run_record(opened, cycles=cycles, **given)
         else:
             recording = record_online(opened, online=choice, **given)
-    print_recording(recording, Console())
+    print_recording(recording)
     if choice is not None:
         calibration = Calibration.open(Path(choice.run))
         print_calibration(calibration)
@@ -212,12 +209,10 @@ def typed_sentence(plan: str) -> str:
 
 
 def _tell_dry(plan: str, checks: "list[Check]") -> None:
-    from rich.console import Console
-
-    from .tables import print_checks
+    from .printed import print_checks
 
     typer.echo(plan)
-    print_checks(checks, Console())
+    print_checks(checks)
     if not all(check.ok for check in checks):
         typer.echo("dry run: nothing was moved; mend what says no, or try it out with --emulator")
         raise typer.Exit(FAILED)

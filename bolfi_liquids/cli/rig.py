@@ -41,14 +41,12 @@ def check(rig: RigOption = None) -> None:
 
     The exit status is 1 when something is missing.
     """
-    from rich.console import Console
-
     from ..hardware import check_rig
     from ..inputs.rigs import rig_of
-    from .tables import print_checks
+    from .printed import print_checks
 
     checks = check_rig(rig_of(rig))
-    print_checks(checks, Console())
+    print_checks(checks)
     if not all(one.ok for one in checks):
         raise typer.Exit(FAILED)
 

@@ -14,7 +14,6 @@ from ..drawing import (
     ORANGE,
     Panels,
     panels,
-    styled,
 )
 from ..wording import spoken, unit_of
 from .criticism_file import EffectStatus
@@ -71,24 +70,23 @@ def score_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
     names = [spoken(str(name)) for name in effects["effect"].to_numpy()[order]]
     states = [EffectStatus(str(status)) for status in effects["status"].to_numpy()[order]]
     ratios = (3, 2) if any_fitted(node) else (1,)
-    with styled():
-        shape, size = (1, len(ratios)), (8.6, 0.26 * len(names) + 1.2)
-        drawn = panels(axes, shape, size, sharey=True, width_ratios=ratios)
-        left, right = drawn.grid[0, 0], drawn.grid[0, -1]
-        if left is not right:
-            _draw_gains(left, gain[order], states)
-            drawn.legend(*left.get_legend_handles_labels(), ncols=len(STATUS_GROUPS))
-        right.axvspan(0.0, USUAL_SCORE, color=LIGHT, linewidth=0, zorder=0)
-        counts = effects["score"].to_numpy() * effects["side"].to_numpy() >= 0.0
-        for at, status in enumerate(states):
-            value, colour = score[order[at]], STATUS_GROUPS[status][1]
-            right.plot([0.0, value], [at, at], color=colour, linewidth=1.0)
-            inside = colour if counts[order[at]] else "white"
-            right.plot(value, at, "o", color=colour, markerfacecolor=inside, markersize=5)
-        right.set_xlim(left=0.0)
-        right.set_xlabel("size of the score [sd]")
-        left.set_yticks(range(len(names)), names)
-        left.set_ylim(len(names) - 0.4, -0.6)
+    shape, size = (1, len(ratios)), (8.6, 0.26 * len(names) + 1.2)
+    drawn = panels(axes, shape, size, sharey=True, width_ratios=ratios)
+    left, right = drawn.grid[0, 0], drawn.grid[0, -1]
+    if left is not right:
+        _draw_gains(left, gain[order], states)
+        drawn.legend(*left.get_legend_handles_labels(), ncols=len(STATUS_GROUPS))
+    right.axvspan(0.0, USUAL_SCORE, color=LIGHT, linewidth=0, zorder=0)
+    counts = effects["score"].to_numpy() * effects["side"].to_numpy() >= 0.0
+    for at, status in enumerate(states):
+        value, colour = score[order[at]], STATUS_GROUPS[status][1]
+        right.plot([0.0, value], [at, at], color=colour, linewidth=1.0)
+        inside = colour if counts[order[at]] else "white"
+        right.plot(value, at, "o", color=colour, markerfacecolor=inside, markersize=5)
+    right.set_xlim(left=0.0)
+    right.set_xlabel("size of the score [sd]")
+    left.set_yticks(range(len(names)), names)
+    left.set_ylim(len(names) - 0.4, -0.6)
     return drawn
 
 
@@ -120,18 +118,17 @@ def confusion_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
     confusion = node["confusion"].to_dataset()
     cosine = np.abs(confusion["cosine"].to_numpy())
     names = [spoken(str(name)) for name in confusion["effect"].to_numpy()]
-    with styled():
-        drawn = panels(axes, (1, 1), (0.45 * len(names) + 2.4, 0.36 * len(names) + 1.5))
-        panel = drawn.grid[0, 0]
-        image = panel.imshow(cosine, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
-        drawn.figure.colorbar(image, ax=panel, label="size of the cosine")
-        panel.set_xticks(range(len(names)), names, rotation=45, ha="right", rotation_mode="anchor")
-        panel.set_yticks(range(len(names)), names)
-        panel.tick_params(length=0)
-        panel.spines[:].set_visible(False)
-        for (row, column), value in np.ndenumerate(cosine):
-            colour, text = "white" if value > DARK_CELL else INK, f"{value:.2f}"
-            panel.text(column, row, text, ha="center", va="center", color=colour, fontsize=8)
+    drawn = panels(axes, (1, 1), (0.45 * len(names) + 2.4, 0.36 * len(names) + 1.5))
+    panel = drawn.grid[0, 0]
+    image = panel.imshow(cosine, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
+    drawn.figure.colorbar(image, ax=panel, label="size of the cosine")
+    panel.set_xticks(range(len(names)), names, rotation=45, ha="right", rotation_mode="anchor")
+    panel.set_yticks(range(len(names)), names)
+    panel.tick_params(length=0)
+    panel.spines[:].set_visible(False)
+    for (row, column), value in np.ndenumerate(cosine):
+        colour, text = "white" if value > DARK_CELL else INK, f"{value:.2f}"
+        panel.text(column, row, text, ha="center", va="center", color=colour, fontsize=8)
     return drawn
 
 
@@ -143,11 +140,10 @@ def coefficient_plot(tree: "DataTree", names: Sequence[str], axes: "Canvas" = No
         names: Of the accepted effects.
         axes: Where to draw, see `drawing.panels`.
     """
-    with styled():
-        drawn = panels(axes, (1, len(names)), (4.3 * max(len(names), 1) + 0.6, 3.0))
-        for panel, name in zip(drawn.grid[0], names, strict=True):
-            _draw_coefficient(panel, name, tree["posterior"][name].to_numpy().ravel())
-        drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
+    drawn = panels(axes, (1, len(names)), (4.3 * max(len(names), 1) + 0.6, 3.0))
+    for panel, name in zip(drawn.grid[0], names, strict=True):
+        _draw_coefficient(panel, name, tree["posterior"][name].to_numpy().ravel())
+    drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
     return drawn
 
 

@@ -13,8 +13,8 @@ from ..drawing import (
     LIGHT,
     ORANGE,
     Panels,
+    hover_strips,
     panels,
-    styled,
 )
 from ..inputs.settings import FALSE_ALARM_RATE
 from ..wording import spoken
@@ -39,21 +39,20 @@ def residual_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
     """
     residual, where = (node[name].to_dataset() for name in ("residual", "where"))
     members, planes = np.unique(residual["recording"]), residual["plane"].to_numpy()
-    with styled():
-        shape, size = (len(members), len(planes)), _size(len(members))
-        drawn = panels(axes, shape, size, sharex="row", sharey=True)
-        for row, member in zip(drawn.grid, members, strict=True):
-            frames = np.flatnonzero(residual["recording"].to_numpy() == member)
-            windows = _of_recording(where, int(member))
-            for panel, plane in zip(row, planes, strict=True):
-                _draw_residual(panel, residual.isel(frame=frames).sel(plane=plane))
-                _shade(panel, _strokes(windows, str(plane)))
-                panel.set_title(f"{plane} plane", loc="left")
-                panel.set_xlabel("time [s]")
-            row[0].set_ylabel("observed less expected [deg]")
-            if len(members) > 1:
-                row[0].set_title(f"{_recording(windows)}\n{planes[0]} plane", loc="left")
-        drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
+    shape, size = (len(members), len(planes)), _size(len(members))
+    drawn = panels(axes, shape, size, sharex="row", sharey=True)
+    for row, member in zip(drawn.grid, members, strict=True):
+        frames = np.flatnonzero(residual["recording"].to_numpy() == member)
+        windows = _of_recording(where, int(member))
+        for panel, plane in zip(row, planes, strict=True):
+            _draw_residual(panel, residual.isel(frame=frames).sel(plane=plane))
+            _shade(panel, _strokes(windows, str(plane)))
+            panel.set_title(f"{plane} plane", loc="left")
+            panel.set_xlabel("time [s]")
+        row[0].set_ylabel("observed less expected [deg]")
+        if len(members) > 1:
+            row[0].set_title(f"{_recording(windows)}\n{planes[0]} plane", loc="left")
+    drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
     return drawn
 
 
@@ -71,9 +70,17 @@ def _draw_residual(axes: "Axes", part: "Dataset") -> None:
         time, -width, width, color=GREY, alpha=0.3, linewidth=0, label="±2 sd of noise and model"
     )
     axes.axhline(0.0, color=GREY, linewidth=0.8)
+    left = {
+        when: np.degrees((part["observed"] - part[f"expected_{when}"]).to_numpy()) for when in drawn
+    }
     for when, (colour, label) in drawn.items():
-        left = np.degrees((part["observed"] - part[f"expected_{when}"]).to_numpy())
-        axes.plot(time, left, color=colour, linewidth=1.2, label=label)
+        axes.plot(time, left[when], color=colour, linewidth=1.2, label=label)
+
+    def text_at(at: int) -> str:
+        values = (f"{MODEL_STYLES[when][1]} {angle[at]:.2f}°" for when, angle in left.items())
+        return f"{time[at]:.2f} s: {', '.join(values)}"
+
+    hover_strips(axes, time, text_at)
 
 
 def _shade(axes: "Axes", strokes: "Dataset") -> None:
@@ -101,21 +108,20 @@ def stroke_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
     """
     residual, where = (node[name].to_dataset() for name in ("residual", "where"))
     members = np.unique(residual["recording"])
-    with styled():
-        shape = len(members), residual.sizes["plane"] + 1
-        drawn = panels(axes, shape, _size(len(members)), sharey=True)
-        for row, member in zip(drawn.grid, members, strict=True):
-            windows = _of_recording(where, int(member))
-            for panel, (title, part, ticks) in zip(row, _bars(residual, windows), strict=True):
-                _draw_bars(panel, part, ticks)
-                panel.set_title(title, loc="left")
-                by_speed = title == BOTH_PLANES
-                panel.set_xlabel("gripper's speed [cm/s]" if by_speed else "stroke")
-            row[0].set_ylabel("RMS [deg]")
-            if len(members) > 1:
-                title = row[0].get_title(loc="left")
-                row[0].set_title(f"{_recording(windows)}\n{title}", loc="left")
-        drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
+    shape = len(members), residual.sizes["plane"] + 1
+    drawn = panels(axes, shape, _size(len(members)), sharey=True)
+    for row, member in zip(drawn.grid, members, strict=True):
+        windows = _of_recording(where, int(member))
+        for panel, (title, part, ticks) in zip(row, _bars(residual, windows), strict=True):
+            _draw_bars(panel, part, ticks)
+            panel.set_title(title, loc="left")
+            by_speed = title == BOTH_PLANES
+            panel.set_xlabel("gripper's speed [cm/s]" if by_speed else "stroke")
+        row[0].set_ylabel("RMS [deg]")
+        if len(members) > 1:
+            title = row[0].get_title(loc="left")
+            row[0].set_title(f"{_recording(windows)}\n{title}", loc="left")
+    drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
     return drawn
 
 
@@ -174,19 +180,18 @@ def held_out_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
         for name in held["explanation"].to_numpy()
         for recording in held["recording"].to_numpy()
     ]
-    with styled():
-        drawn = panels(axes, (1, 1), (8.6, 0.55 * len(rows) + 1.2))
-        panel = drawn.grid[0, 0]
-        for at, (_, row) in enumerate(rows):
-            values = {name: float(np.degrees(row[name])) for name in HELD_OUT_MARKS}
-            _draw_held_out(panel, at, values)
-        panel.set_yticks(range(len(rows)), [label for label, _ in rows])
-        panel.set_ylim(len(rows) - 0.4, -0.6)
-        panel.set_xlim(left=0.0)
-        panel.set_xlabel("RMS of observed less expected [deg]")
-        handles, labels = panel.get_legend_handles_labels()
-        once = dict(zip(labels, handles, strict=True))
-        drawn.legend(list(once.values()), list(once), ncols=len(once))
+    drawn = panels(axes, (1, 1), (8.6, 0.55 * len(rows) + 1.2))
+    panel = drawn.grid[0, 0]
+    for at, (_, row) in enumerate(rows):
+        values = {name: float(np.degrees(row[name])) for name in HELD_OUT_MARKS}
+        _draw_held_out(panel, at, values)
+    panel.set_yticks(range(len(rows)), [label for label, _ in rows])
+    panel.set_ylim(len(rows) - 0.4, -0.6)
+    panel.set_xlim(left=0.0)
+    panel.set_xlabel("RMS of observed less expected [deg]")
+    handles, labels = panel.get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))
+    drawn.legend(list(once.values()), list(once), ncols=len(once))
     return drawn
 
 
@@ -223,14 +228,13 @@ def pour_residual_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
     """
     residual = node["residual"].to_dataset()
     outcomes = residual["outcome"].to_numpy()
-    with styled():
-        drawn = panels(axes, (1, len(outcomes)), (4.3 * len(outcomes), 3.9))
-        for panel, outcome in zip(drawn.grid[0], outcomes, strict=True):
-            _draw_pours(panel, residual.sel(outcome=outcome))
-            panel.set_title(str(outcome), loc="left")
-            panel.set_xlabel("expected [% of the liquid]")
-        drawn.grid[0, 0].set_ylabel("observed [% of the liquid]")
-        drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
+    drawn = panels(axes, (1, len(outcomes)), (4.3 * len(outcomes), 3.9))
+    for panel, outcome in zip(drawn.grid[0], outcomes, strict=True):
+        _draw_pours(panel, residual.sel(outcome=outcome))
+        panel.set_title(str(outcome), loc="left")
+        panel.set_xlabel("expected [% of the liquid]")
+    drawn.grid[0, 0].set_ylabel("observed [% of the liquid]")
+    drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
     return drawn
 
 

@@ -2,15 +2,16 @@
 
 import json
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..calibration.result import Calibration
 from ..calibration.summary import Fitted
-from ..drawing import given_or_shown
+from ..drawing import shown
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..run.run import Run, RunOrPath
-from ..wording import html_table, sentence, spoken
+from ..wording import html_table, spoken
 from .summary import CriticismSummary
 
 if TYPE_CHECKING:
@@ -47,8 +48,7 @@ class Criticism:
     def _repr_html_(self) -> str:
         rows = {"run": self.base.path, "verdict": self.verdict, "p": f"{self.summary.p_value:.2g}"}
         rows |= {
-            spoken(name): sentence("criticism.interval", name=name, values=values)
-            for name, values in self.summary.coefficient.items()
+            spoken(name): values.interval(name) for name, values in self.summary.coefficient.items()
         }
         if self.effects and not self.summary.coefficient:
             rows["effects"] = ", ".join(map(spoken, self.effects))
@@ -124,19 +124,19 @@ class Criticism:
         """Observed less expected against time, before and after, strokes that differ marked."""
         from .figures import residual_plot
 
-        return residual_plot(self.tree.children["stirs"], given_or_shown(axes)).grid
+        return shown(partial(residual_plot, self.tree.children["stirs"]), axes)
 
     def plot_strokes(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Size of the difference by stroke, plane and speed, before and after."""
         from .figures import stroke_plot
 
-        return stroke_plot(self.tree.children["stirs"], given_or_shown(axes)).grid
+        return shown(partial(stroke_plot, self.tree.children["stirs"]), axes)
 
     def plot_scores(self, source: str = "stirs", axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """How well each effect alone would explain the difference."""
         from .effect_figures import score_plot
 
-        return score_plot(self.tree.children[source], given_or_shown(axes)).grid
+        return shown(partial(score_plot, self.tree.children[source]), axes)
 
     def plot_confusion(
         self, source: str = "stirs", axes: "ArrayLike | None" = None
@@ -144,7 +144,7 @@ class Criticism:
         """Which effects these data cannot distinguish: cosines between their signatures."""
         from .effect_figures import confusion_plot
 
-        return confusion_plot(self.tree.children[source], given_or_shown(axes)).grid
+        return shown(partial(confusion_plot, self.tree.children[source]), axes)
 
     def plot_coefficient(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Posterior of the accepted effects' coefficients.
@@ -156,7 +156,7 @@ class Criticism:
 
         if not self.summary.accepted:
             raise ValueError("no effect was accepted, so there is no coefficient to plot")
-        return coefficient_plot(self.tree, self.summary.accepted, given_or_shown(axes)).grid
+        return shown(partial(coefficient_plot, self.tree, self.summary.accepted), axes)
 
     def plot_held_out(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """RMS on recordings that were not fitted, before and after.
@@ -170,7 +170,7 @@ class Criticism:
             raise ValueError(
                 "no explanation was tested on held-out recordings; criticise the run with held_out"
             )
-        return held_out_plot(self.tree.children["stirs"], given_or_shown(axes)).grid
+        return shown(partial(held_out_plot, self.tree.children["stirs"]), axes)
 
     def plot_pours(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Observed against expected fractions of each pour, before and after.
@@ -182,7 +182,7 @@ class Criticism:
 
         if "pours" not in self.tree.children:
             raise ValueError("no pours were criticised; criticise the run with pours")
-        return pour_residual_plot(self.tree.children["pours"], given_or_shown(axes)).grid
+        return shown(partial(pour_residual_plot, self.tree.children["pours"]), axes)
 
 
 def calibration_to_pour(run: Run) -> Calibration:

@@ -5,20 +5,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drawing import BLUE, INK, ORANGE
+from ..drawing import BLUE, INK, ORANGE, Panels, hover_points, new_figure, panels
 from ..seeds import Phase, generator
 from .spillage import ACTION, RISK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.contour import QuadContourSet
+    from matplotlib.figure import Figure
     from matplotlib.patches import Patch
     from xarray import Dataset, DataTree
+
+    from ..drawing import Canvas
 
 PERCENT_LEVELS = (0, 1, 2, 5, 10, 20, 40, 70, 100)
 """Contour levels of the spilled percentage, denser where little is spilled."""
 
 BAD_CASE = 0.9  # quantile over the draws of the second map
+HOVER_STEPS = 12  # actions along each axis whose spillage is shown under the pointer
 SURE, BOOTSTRAP_SAMPLES = 0.95, 200
 """Confidence that an action is worse, and number of bootstrap samples for it."""
 
@@ -30,6 +34,50 @@ MIN_COMPARED_DRAWS = 8
 
 CHOICES = {"chosen": (BLUE, "o", "chosen pour"), "plug_in": (ORANGE, "s", "best at θ* alone")}
 """Colour, marker and label of the two actions, by their group in pour.nc."""
+
+
+def map_plot(tree: "DataTree", axes: "Canvas" = None) -> Panels:
+    """Expected spillage over the actions, with the chosen one and the plug-in.
+
+    Args:
+        tree: pour.nc.
+        axes: Where to draw, see `drawing.panels`.
+    """
+    drawn = panels(axes, (1, 1), (4.6, 3.6))
+    axis = drawn.grid[0, 0]
+    drawn.figure.colorbar(draw_expected(axis, tree), ax=axis)
+    drawn.legend(*axis.get_legend_handles_labels())
+    return drawn
+
+
+def pour_figure(tree: "DataTree") -> "Figure":
+    """Spillage over the actions, as expected and in a bad case (above), and of the two choices over
+    outcomes (below).
+
+    Args:
+        tree: pour.nc.
+    """
+    actions = tree["actions"].to_dataset()
+    spilled = actions["spilled"].to_numpy()
+    x, y = action_axes(tree)
+    figure = new_figure(8.6, 6.4)
+    upper, lower = figure.subfigures(2, 1, height_ratios=(5, 4))
+    expected, bad = upper.subplots(1, 2, sharey=True)
+    shades = draw_expected(expected, tree)
+    handles, labels = expected.get_legend_handles_labels()
+    chosen = place_of(actions, tree["chosen"].attrs)
+    alike = not_surely_worse(spilled, tree.attrs["risk"], chosen)
+    if alike.any():
+        handles.append(dot_actions(expected, x, y, alike))
+        labels.append("not surely worse than the chosen")
+    draw_map(bad, x, y, 100.0 * np.quantile(spilled, BAD_CASE, axis=0))
+    mark_choices(bad, tree)
+    bad.set_title(f"in {100 * BAD_CASE:.0f} % of the draws at most", loc="left")
+    bad.set_xlabel(expected.get_xlabel())
+    upper.colorbar(shades, ax=[expected, bad], label="spilled [%]")
+    upper.legend(handles, labels, loc="outside upper center", ncols=3)
+    draw_outcomes(lower.subplots(), tree)
+    return figure
 
 
 def action_axes(tree: "DataTree") -> tuple[NDArray, NDArray]:
@@ -62,6 +110,10 @@ def draw_expected(axes: "Axes", tree: "DataTree") -> "QuadContourSet":
 
 def draw_map(axes: "Axes", x: NDArray, y: NDArray, percent: NDArray) -> "QuadContourSet":
     """Percentages (W, D) over angular velocities x (W,) [deg/s] and distances y (D,) [cm]."""
+    some = tuple(slice(None, None, -(-len(axis) // HOVER_STEPS)) for axis in (x, y))
+    turn, apart = (part.ravel() for part in np.meshgrid(x[some[0]], y[some[1]], indexing="ij"))
+    shown = zip(turn, apart, percent[some].ravel(), strict=True)
+    hover_points(axes, turn, apart, [f"{a:.0f}°/s, {b:.1f} cm: {c:.2g} %" for a, b, c in shown])
     shades = axes.contourf(x, y, percent.T, levels=PERCENT_LEVELS, cmap="Greys", alpha=0.8)
     lines = axes.contour(x, y, percent.T, levels=PERCENT_LEVELS[1:4], colors=INK, linewidths=0.6)
     axes.clabel(lines, fmt="%g %%", fontsize=7.5)

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -135,16 +136,10 @@ class Pour:
         Returns:
             The axes.
         """
-        from ..drawing import given_or_shown, panels, styled
-        from .figures import draw_expected
+        from ..drawing import shown
+        from .figures import map_plot
 
-        canvas = given_or_shown(ax)
-        with styled():
-            drawn = panels(canvas, (1, 1), (4.6, 3.6))
-            axes = drawn.grid[0, 0]
-            drawn.figure.colorbar(draw_expected(axes, self.tree), ax=axes)
-            drawn.legend(*axes.get_legend_handles_labels())
-        return axes
+        return shown(partial(map_plot, self.tree), ax)[0, 0]
 
     def check_current(self, run: Run) -> None:
         """Raise `ValueError` if another pour was chosen in its run since."""

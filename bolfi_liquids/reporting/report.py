@@ -1,33 +1,35 @@
 """report.html: one file that shows a run, without anything from outside it."""
 
+import base64
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import astuple
+from functools import partial
 from importlib.resources import files
+from io import BytesIO
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from ..calibration.fit_figures import inclination_figure, stroke_figure
-from ..calibration.posterior_figure import posterior_figure
-from ..calibration.result import Calibration
-from ..calibration.search_figure import search_figure
-from ..calibration.summary import CalibrationSummary
+from ..calibration.fit_figures import draw_fit, draw_strokes
+from ..calibration.posterior_figure import draw_posterior
+from ..calibration.search_figure import draw_search
+from ..criticism.effect_figures import coefficient_plot, confusion_plot, score_plot
+from ..criticism.figures import held_out_plot, pour_residual_plot, residual_plot, stroke_plot
+from ..criticism.result import Criticism
+from ..drawing import styled, to_svg
 from ..files import write_text
-from ..hover_labels import script_json
-from ..inputs.prior import Described
-from ..pouring.result import Pour
+from ..inputs.settings import PourSettings
+from ..pouring.figures import pour_figure
 from ..run.compute import open_compute
-from ..run.run import REPORT, Run, RunOrPath
-from ..wording import LIQUID_UNITS, sentence
-from . import sentences
-from .criticism_chapter import criticism_context
-from .warnings import Results, warnings_of
+from ..run.run import REPORT, RUN_TOML, Run, RunOrPath
+from .facts import held_out_of
+from .prose import prose
+from .warnings import Results
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ..inference.simulations import Compute, Workers
 
-PAGE_TEMPLATE = "report.html.jinja"
+PAGE_TEMPLATE, STYLE = "report.html.jinja", "report.css"
 
 
 def report(
@@ -43,7 +45,7 @@ def report(
     Args:
         run: A RUN directory with a finished calibration; or a calibration, criticism or pour.
         moving: Whether it has moving pictures, of a few stirs and pours that are simulated for
-            them once and kept in RUN/frames.nc; nothing else is simulated.
+            them once and kept in RUN/moving; nothing else is simulated.
         executor, timeout, progress: Of their simulations, see `calibrate`.
 
     Raises:
@@ -59,12 +61,7 @@ def report(
 
 
 def written(
-    results: Results,
-    compute: "Compute",
-    *,
-    moving: bool = True,
-    progress: bool = True,
-    chapters: Mapping[str, Any] = MappingProxyType({}),
+    results: Results, compute: "Compute", *, moving: bool = True, progress: bool = True
 ) -> Path:
     """Write RUN/report.html from given results.
 
@@ -72,24 +69,7 @@ def written(
         results: What the run holds.
         compute: Where moving pictures are simulated.
         moving, progress: See `report`.
-        chapters: What is drawn already, by the names of `CHAPTERS`.
     """
-    calibration = results.calibration
-    pictures = _moving(results, compute, progress) if moving else None
-    given = {name: getattr(results, name) for name in CHAPTERS}
-    drawn = {
-        name: chapters.get(name) or (one and CHAPTERS[name](one)) for name, one in given.items()
-    }
-    page = _page(drawn, results, pictures)
-    return write_text(calibration.path / REPORT, page)
-
-
-def _page(
-    chapters: Mapping[str, Any],
-    results: Results,
-    pictures: dict[str, Any] | None,
-) -> str:
-    """The page of a run, with moving pictures if there are any."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -99,101 +79,90 @@ def _page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(PAGE_TEMPLATE).render(
-        **chapters,
-        warnings=warnings_of(results),
-        moving=pictures,
-        moving_json=script_json(pictures),
-        style=_text("report.css"),
-        script=_text("report.js"),
+    facts = results.facts
+    page = environment.get_template(PAGE_TEMPLATE).render(
+        **facts,
+        prose=partial(prose, facts=facts),
+        figures=figures_of(results),
+        films=_films(results, compute, progress) if moving else {},
+        made_from=_made_from(results),
+        style=(files("bolfi_liquids.data") / STYLE).read_text(encoding="utf-8"),
         record=results.calibration.record,
         run=results.calibration.path,
     )
+    return write_text(results.calibration.path / REPORT, page)
 
 
-def calibration_context(calibration: Calibration) -> dict[str, Any]:
-    summary, tree = calibration.summary, calibration.tree
-    prior = tree["prior"]
-    return {
-        "summary": summary,
-        "parameters": [
-            sentences.parameter_sentence(name, values, prior[name].to_numpy().ravel())
-            for name, values in summary.parameters.items()
-        ],
-        "fit": sentences.fit_sentence(summary),
-        "model_error": sentences.model_error_sentence(summary),
-        "inclination": inclination_figure(tree),
-        "by_stroke": stroke_figure(tree),
-        "posterior": posterior_figure(tree),
-        "search": search_figure(tree),
-        "start": min(int(tree.attrs["initial"]), summary.n_simulations),
-        "confirming": tree["simulations"].sizes["simulation"] - summary.n_simulations,
-        "priors": {
-            name: prior_text(one) for name, one in calibration.record["settings"]["prior"].items()
-        },
-        "rows": [_row(name, summary) for name in summary.parameters],
-    }
+def figures_of(results: Results) -> dict[str, str]:
+    """The figures of a page, SVG elements by name."""
+    tree = results.calibration.tree
+    with styled():
+        drawn = {
+            "inclination": draw_fit(tree).figure,
+            "by-stroke": draw_strokes(tree).figure,
+            "posterior": draw_posterior(tree).figure,
+            "search": draw_search(tree).figure,
+        }
+        if results.criticism is not None:
+            drawn |= _criticism_figures(results.criticism)
+        if results.pour is not None:
+            drawn["pour"] = pour_figure(results.pour.tree)
+        return {name: to_svg(figure, name) for name, figure in drawn.items()}
 
 
-def prior_text(described: Described) -> str:
-    """A distribution of run.toml as Python writes it, such as `LogUniform(0.003, 20)`."""
-    values = {
-        name: prior_text(value) if isinstance(value, Mapping) else f"{value:g}"
-        for name, value in described.items()
-        if name != "family"
-    }
-    if set(values) == {"low", "high"}:
-        return f"{described['family']}({values['low']}, {values['high']})"
-    named = ", ".join(f"{name}={value}" for name, value in values.items())
-    return f"{described['family']}({named})"
+def _criticism_figures(criticism: Criticism) -> dict[str, "Figure"]:
+    tree, accepted = criticism.tree, criticism.summary.accepted
+    sources = {name: tree.children[name] for name in ("stirs", "pours") if name in tree.children}
+    stirs = sources["stirs"]
+    drawn = {"residual": residual_plot(stirs), "strokes": stroke_plot(stirs)}
+    if accepted:
+        drawn["coefficient"] = coefficient_plot(tree, accepted)
+    if held_out_of(stirs) is not None:
+        drawn["held-out"] = held_out_plot(stirs)
+    if "pours" in sources:
+        drawn["pours"] = pour_residual_plot(sources["pours"])
+    for name, source in sources.items():
+        drawn[f"scores-{name}"] = score_plot(source)
+        drawn[f"confusion-{name}"] = confusion_plot(source)
+    return {name: plot.figure for name, plot in drawn.items()}
 
 
-def _row(name: str, summary: CalibrationSummary) -> dict[str, Any]:
-    numbers = [*astuple(summary.parameters[name]), summary.best[name], summary.closest[name]]
-    return {
-        "name": name,
-        "unit": LIQUID_UNITS.get(name, "1"),
-        "numbers": [f"{number:.3g}" for number in numbers],
-    }
+def _films(results: Results, compute: "Compute", progress: bool) -> dict[str, list[dict[str, str]]]:
+    """The films of the latest posterior and the pour: caption, a still and the film, as URLs."""
+    from .films import films_of
+
+    shown: dict[str, list[dict[str, str]]] = {}
+    for film in films_of(results.latest, results.pour, compute, progress=progress):
+        if content := film.path.read_bytes():
+            each = {"liquid": str(film.draw), "still": _url(_still(content)), "film": _url(content)}
+            shown.setdefault(film.scene.name, []).append(each)
+    return shown
 
 
-def _pour_context(pour: Pour) -> dict[str, Any]:
-    from .pour_figure import pour_figure
+def _still(content: bytes) -> bytes:
+    """The picture in the middle of a film."""
+    from PIL import Image, ImageSequence
 
-    summary, tree = pour.summary, pour.tree
-    return {
-        "summary": summary,
-        "chosen": sentences.pour_sentence(summary),
-        "plug_in": sentences.plug_in_sentence(summary),
-        "fate": sentences.fate_sentences(summary),
-        "given": sentences.given_sentences(summary),
-        "map": sentences.map_sentences(summary),
-        "limits": sentence("pour.limits"),
-        "contact_angle": sentences.contact_angle_sentences(json.loads(tree.attrs["cups"])),
-        "figure": pour_figure(tree),
-        "made_with": {k: v for k, v in tree.attrs.items() if k not in ("made_from", "summary")},
-        "rows": [("chosen pour", summary), ("best at θ* alone", summary.plug_in)],
-    }
+    picture = BytesIO()
+    with Image.open(BytesIO(content)) as film:
+        pictures = ImageSequence.all_frames(film)
+    pictures[len(pictures) // 2].convert("RGB").save(picture, "WEBP", quality=85)
+    return picture.getvalue()
 
 
-CHAPTERS: dict[str, Callable[[Any], dict[str, Any]]] = {
-    "calibration": calibration_context,
-    "criticism": criticism_context,
-    "pour": _pour_context,
-}
-"""What the template needs of each result."""
+def _url(content: bytes) -> str:
+    return f"data:image/webp;base64,{base64.b64encode(content).decode()}"
 
 
-def _moving(results: Results, compute: "Compute", progress: bool) -> dict[str, Any] | None:
-    """Moving pictures of the latest posterior and the pour."""
-    from .frames import Shown, frames_of
-    from .moving_pictures import moving_context
-
-    latest = results.latest
-    shown = Shown(latest, latest.run.recordings[0], results.pour)
-    return moving_context(shown, frames_of(shown, compute, progress=progress))
-
-
-def _text(name: str) -> str:
-    """Of a file that stands in the page as it is."""
-    return (files("bolfi_liquids.data") / name).read_text(encoding="utf-8")
+def _made_from(results: Results) -> dict[str, str]:
+    """The texts of run.toml, and of what criticism and pour were made from."""
+    run = results.calibration.run
+    made = {RUN_TOML: (run.path / RUN_TOML).read_text(encoding="utf-8")}
+    if results.criticism is not None:
+        made["criticism"] = json.dumps(results.criticism.made_from, indent=1)
+    if results.pour is not None:
+        attrs = results.pour.tree.attrs
+        settings = {name: attrs[name] for name in PourSettings.__dataclass_fields__}
+        cups = {"cups": json.loads(attrs["cups"])}
+        made["pour"] = json.dumps(settings | cups, indent=1, default=lambda number: number.item())
+    return made

@@ -17,7 +17,7 @@ from ..models import Cups
 from ..pouring.result import Judged, Pour
 from ..reporting.warnings import Results, warnings_of
 from ..run.run import RESULTS, Run, RunOrPath
-from ..wording import Sentence, at_most, spilled
+from ..wording import at_most, spilled
 from .armed_session import Ask, Task, armed_session, check_consent, dry_run
 from .live_view import SessionView
 
@@ -48,7 +48,7 @@ class ChosenPour:
     judged: Judged
     cups: Cups
     fit_is_bad: bool
-    warnings: tuple[Sentence, ...]
+    warnings: tuple[str, ...]
 
     def check_fit(self, *, despite_bad_fit: bool) -> None:
         """Refuse a pour that was chosen over a posterior whose fit is bad.

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 RUN_TOML = "run.toml"
 SIMULATIONS = "simulations.sqlite"
-FRAMES = "frames.nc"
+MOVING = "moving"
 REPORT = "report.html"
 RESULTS = {
     "calibrate": "posterior.nc",
@@ -48,7 +48,7 @@ RESULTS = {
 }
 """File of each step's result, in the order of the steps."""
 
-OWN_FILES = (SIMULATIONS, *RESULTS.values(), GIVEN_POURS, RECORDINGS_FOLDER, FRAMES, REPORT)
+OWN_FILES = (SIMULATIONS, *RESULTS.values(), GIVEN_POURS, RECORDINGS_FOLDER, MOVING, REPORT)
 """What only a run may hold."""
 
 MUST_AGREE = ("settings", "inputs", "simulator", "engine")

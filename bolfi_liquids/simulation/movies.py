@@ -38,13 +38,12 @@ def film_pour(
     progress: bool,
 ) -> None:
     """Simulate a pour again, and write what it looks like."""
-    from .. import models
     from ..movie.pour import pour_pictures
 
     rate, distance = (float(np.asarray(x)) for x in (action.angular_velocity, action.distance))
     with failures_raised():
-        batch = simulator.batch({**theta_of(described), RATE: rate}, [described.seed])
-        frames = models.pour_frames(batch, rate=PICTURE_RATE)
+        theta = {**theta_of(described), RATE: rate}
+        frames = simulator.frames(theta, described.seed, PICTURE_RATE)
     turn = f"{np.degrees(rate):g}°/s, lip to axis {100 * distance:g} cm"
     caption = [*described.lines(), turn]
     pictures = pour_pictures(frames, landings, simulator.cups, distance, caption)

@@ -17,7 +17,7 @@ from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.criticism.source_summary import DifferingWindow, GapSummary, SourceVerdict
 from bolfi_liquids.criticism.summary import CameraNoise, CriticismSummary
 from bolfi_liquids.inputs.cups import bundled_cups
-from bolfi_liquids.reporting.frames import Shown, frames_of
+from bolfi_liquids.reporting.films import films_of
 from bolfi_liquids.run.run import Run, as_json
 
 BUNDLED = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
@@ -101,17 +101,9 @@ def pour(calibration, pour_settings, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def shown(pour):
-    """What a report shows of the pour's run, which was not criticised."""
-    calibration = bl.Calibration.open(pour.path)
-    (recording,) = calibration.run.recordings
-    return Shown(calibration, recording, pour)
-
-
-@pytest.fixture(scope="session")
-def frames(shown):
-    """What draws of the calibration look like, stirred and poured."""
-    return frames_of(shown, Compute(), progress=False)
+def films(pour):
+    """Moving pictures of the pour's run, which was not criticised."""
+    return films_of(bl.Calibration.open(pour.path), pour, Compute(), progress=False)
 
 
 @pytest.fixture

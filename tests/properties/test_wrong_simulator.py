@@ -24,7 +24,7 @@ WRONG = Path(__file__).parents[1] / "data" / "wrong_simulator"
 SETTINGS = {"budget": 12, "batch": 4, "chains": 2, "draws": 200, "sampler": "emcee"}
 SAMPLES = 120  # 4 s, five strokes
 TRUTHS = {"water": 0.001, "oil": 0.1, "glycerin": 1.0}  # Pa s
-BAD_FIT, MISFIT = "calibration.bad_fit", "warning.misfit_not_criticised"
+BAD_FIT, MISFIT = "fit is bad", "more than noise"  # words of warnings
 GLYCERIN = {"viscosity": np.array([1.0]), "cohesion": np.array([0.063 / 0.08])}
 GLYCERIN_DENSITY = 1260.0  # kg/m3
 HOLD = 2.1  # s, of the reference's glycerin
@@ -49,10 +49,10 @@ def test_a_posterior_that_misses_the_truth_comes_with_a_warning(liquid, warned, 
     )
     viscosity = calibration.summary.parameters["viscosity"]
     assert not viscosity.q05 <= TRUTHS[liquid] <= viscosity.q95
-    keys = [sentence.key for sentence in warnings_of(Results.of(calibration.run))]
-    assert any(key.startswith(warned) for key in keys)
+    warnings = warnings_of(Results.of(calibration.run))
+    assert any(warned in warning for warning in warnings)
     if warned == BAD_FIT:
-        assert keys[0] == BAD_FIT
+        assert BAD_FIT in warnings[0]
         with pytest.raises(bl.InputError):
             bl.choose_pour(calibration, progress=False)
 

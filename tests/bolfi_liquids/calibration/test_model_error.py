@@ -15,7 +15,8 @@ from bolfi_liquids.calibration import calibrate as calibrating
 from bolfi_liquids.calibration import check as checking
 from bolfi_liquids.calibration.check import check_of
 from bolfi_liquids.calibration.model_error import SHORT_PART, model_error
-from bolfi_liquids.reporting.sentences import model_error_sentence
+from bolfi_liquids.reporting.facts import fit_facts
+from bolfi_liquids.reporting.prose import prose
 from bolfi_liquids.run.simulations import Kept
 from bolfi_liquids.simulators import stir_simulator
 
@@ -42,11 +43,16 @@ def test_a_calibration_says_for_which_error_it_allows(calibration):
     summary = calibration.summary
     usual = np.degrees([stirring_error(v) for v in (0.001, 0.05, 0.1, 1.0)])
     assert np.isclose(summary.model_error_deg, np.hypot(1.0, SHORT_PART) * usual).any()
-    said = str(model_error_sentence(summary))
+
+    def told(summary):
+        _, error = prose("fit", {"calibration": fit_facts(summary)})
+        return error
+
+    said = told(summary)
     assert f"{summary.model_error_deg:.2f}° RMS" in said and "usual" in said
-    learned = str(model_error_sentence(replace(summary, clean=("a.nc", "b.nc"))))
+    learned = told(replace(summary, clean=("a.nc", "b.nc")))
     assert "learned from a.nc, b.nc" in learned
-    without = str(model_error_sentence(replace(summary, model_error_deg=0.0)))
+    without = told(replace(summary, model_error_deg=0.0))
     assert "do not allow" in without and "--surrogate signal" in without
 
 

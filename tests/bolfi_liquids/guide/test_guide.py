@@ -72,14 +72,6 @@ def test_files_are_told_variable_by_variable(calibration, pour, name):
             assert in_page[what][1] == plain.get(unit, unit), what
 
 
-@pytest.mark.slow
-def test_frames_are_told_variable_by_variable(pour, frames):
-    in_page, in_file = told("frames.nc"), held(pour.path / "frames.nc")
-    assert set(in_page) == set(in_file)
-    for what, entry in in_page.items():
-        assert entry == in_file[what], what
-
-
 def fields(value, path=""):
     """`a.b` for each number or text of nested tables."""
     if not isinstance(value, dict):

@@ -224,14 +224,16 @@ def test_pours_that_may_not_be_executed(told, poured_run, tmp_path):
 
 
 def test_criticism_without_proof_or_with_none(told, run, criticism_summary):
-    from bolfi_liquids.reporting.criticism_sentences import verdict_sentence
-    from bolfi_liquids.wording import sentence
+    from bolfi_liquids.reporting.facts import verdict_facts
+    from bolfi_liquids.reporting.prose import prose
 
     copy = next((run / "recordings").iterdir())
     shutil.copy(copy, "stir.nc")
     assert told("criticise runs/mine --held-out stir.nc") in QUOTED
-    assert str(sentence("criticism.no_baseline")) in QUOTED
-    unconfirmed = str(verdict_sentence(replace(criticism_summary, held_out=0)))
+    (no_baseline,) = prose("baseline", {"criticism": {"baseline": 0, "not_clean": ()}})
+    assert no_baseline in QUOTED
+    facts = verdict_facts(replace(criticism_summary, held_out=0))
+    (unconfirmed,) = prose("verdict", {"criticism": facts})
     assert any(unconfirmed.endswith(message) for message in QUOTED)
 
 
@@ -252,7 +254,8 @@ def test_missing_extra(told, monkeypatch):
 def test_warnings_of_the_engine(calibration):
     from bolfi_liquids.inference.surrogates.warnings import OUTSIDE
 
-    from bolfi_liquids.reporting import sentences
+    from bolfi_liquids.reporting.facts import fit_facts
+    from bolfi_liquids.reporting.prose import prose
 
     assert f"EmulatorWarning: {OUTSIDE}" in QUOTED
     summary = replace(
@@ -264,10 +267,12 @@ def test_warnings_of_the_engine(calibration):
         below_least_viscosity=0.34,
         least_viscosity=0.0494,
     )
-    (unconverged,) = sentences.sampler_sentences(summary)
-    assert str(unconverged) in QUOTED
-    (thin,) = sentences.least_viscosity_sentences(summary)
-    assert any(str(thin).startswith(message) for message in QUOTED)
+    latest = fit_facts(summary) | {"bad": None}
+    search = {"doubts": (), "few_searched": False, "misfit": False}
+    facts = {"latest": latest, "calibration": search, "criticism": None, "pour": None}
+    unconverged, _, thin = prose("warnings", facts | {"outdated": ()})
+    assert unconverged in QUOTED
+    assert any(thin.startswith(message) for message in QUOTED)
 
 
 def test_warnings_of_stirs_that_are_cut_too_roughly():
@@ -303,13 +308,13 @@ def test_warnings_of_a_wrong_frame_and_of_a_bad_fit(calibration):
 def test_sentences_that_the_page_on_priors_quotes(calibration):
     from bolfi_liquids.inference.surrogates.warnings import OUTSIDE
 
-    from bolfi_liquids.wording import sentence
+    from bolfi_liquids.reporting.facts import calibration_facts
+    from bolfi_liquids.reporting.prose import prose
 
-    values = next(iter(calibration.summary.parameters.values()))
-    said = [
-        str(sentence("calibration.parameter_at_the_end", name="x", values=values, share=0.5)),
-        OUTSIDE,
-    ]
+    facts = calibration_facts(calibration)
+    for one in facts["parameters"]:
+        one |= {"learned": True, "at_end": True}
+    said = [prose("liquid", {"calibration": facts})[0], OUTSIDE]
     page = " ".join(read_page("priors").split())
     quoted = [one for one in re.findall(r'"([^"]*)"', page) if len(one.split()) > 6]
     assert len(quoted) == len(said)

@@ -11,7 +11,7 @@ from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.described_liquid import Described, read_effects
 from bolfi_liquids.inputs.open import open_recording
-from bolfi_liquids.movie.file import WRITERS, write_movie
+from bolfi_liquids.movie.file import KINDS, write_movie
 from bolfi_liquids.movie.landed_liquid import GRAVITY, landed, level
 from bolfi_liquids.movie.pour import (
     pour_pictures,
@@ -229,7 +229,7 @@ def test_an_mp4_has_its_frames_size_and_rate(tmp_path):
     assert [square.min(), square.max()] == pytest.approx([9, 23], abs=2)
 
 
-@pytest.mark.parametrize("suffix", WRITERS)
+@pytest.mark.parametrize("suffix", KINDS)
 def test_a_film_that_breaks_leaves_the_old_one(tmp_path, suffix):
     def broken():
         yield from moving_square(2)

@@ -1,0 +1,447 @@
+"""Facts of a run as page and terminal show them: each number is rounded once, here, to a text.
+
+A chapter is a dictionary: `calibration`, `criticism` and `pour` of what each command found,
+`latest` of the posterior that is poured. Conditions under which something is said are facts, too.
+"""
+
+import json
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..calibration.bad_fit import bad_fit
+from ..calibration.result import Calibration
+from ..calibration.summary import CalibrationSummary, ParameterSummary, SamplerStatus
+from ..criticism.result import Criticism
+from ..criticism.source_summary import DifferingWindow, PourVerdict, SourceVerdict
+from ..criticism.summary import CriticismSummary
+from ..inference.criticism.verdict_kind import VerdictKind
+from ..pouring.draining import TENTH, Hold
+from ..pouring.result import ActionSummary, GivenPour, GivenSummary, Pour
+from ..pouring.spillage import ACTION
+from ..wording import (
+    LEAST_SPILLED,
+    LIQUID_UNITS,
+    at_most,
+    percent,
+    spilled,
+    spoken,
+    unit_of,
+    with_unit,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from xarray import Dataset, DataTree
+
+Facts = dict[str, Any]
+
+UNLEARNED_SHARE = 0.6
+"""Share of the prior's 90 % interval above which little was learned."""
+
+PRIOR_END = 0.02
+"""Quantile of the prior; an interval that reaches it is cut off there."""
+
+FIT_AT_NOISE, FIT_NEAR_NOISE = 1.1, 1.5
+"""Times the noise up to which a fit is as close, or nearly as close, as can be expected."""
+
+MIN_ALIKE_SHARE = 0.01
+"""Share of the posterior below which thin liquids are not mentioned."""
+
+MIN_SEARCHED = 3
+"""Simulations that the engine chose, of which fewer are no search."""
+
+DETECTABLE_SNR = 3.0
+"""Signal-to-noise ratio from which a difference can be relied upon."""
+
+MAX_LISTED = 3
+"""Windows, or effects, that a sentence lists."""
+
+MUCH_SPILLED = 0.05
+"""Expected spillage that a person would mop up."""
+
+PRIOR_ENDS = {
+    ("angular_velocity", 0): "slowest",
+    ("angular_velocity", 1): "fastest",
+    ("distance", 0): "nearest",
+    ("distance", 1): "farthest",
+}
+"""What an action at either end of the range of each quantity is called."""
+
+NONE = "–"
+"""In a table, where there is no number."""
+
+
+def calibration_facts(calibration: Calibration) -> Facts:
+    """Of the search, the posterior and the fit.
+
+    Args:
+        calibration: Without what a criticism accepted.
+    """
+    summary, tree = calibration.summary, calibration.tree
+    prior, initial = tree["prior"], int(tree.attrs["initial"])
+    searched = summary.n_simulations - initial
+    return {
+        **fit_facts(summary),
+        "version": summary.version,
+        "parameters": [
+            {
+                **_parameter(name, values),
+                **_learned(values, prior[name].to_numpy().ravel()),
+                "best": f"{summary.best[name]:.3g}",
+                "closest": f"{summary.closest[name]:.3g}",
+            }
+            for name, values in summary.parameters.items()
+        ],
+        "simulations": summary.n_simulations,
+        "start": min(initial, summary.n_simulations),
+        "searched": searched,
+        "few_searched": searched < MIN_SEARCHED,
+        "checks": summary.n_check_simulations,
+        "confirming": tree["simulations"].sizes["simulation"] - summary.n_simulations,
+        "confirmed": summary.confirmed,
+        "seconds": {name: f"{spent:.0f}" for name, spent in vars(summary.seconds).items()},
+        "doubts": summary.emulator_warnings,
+    }
+
+
+def fit_facts(summary: CalibrationSummary) -> Facts:
+    """Of the fit and the sampler, whichever effects were added."""
+    alike = summary.below_least_viscosity
+    ratio = summary.fit_rms_deg / summary.noise_deg
+    near = summary.unexplained_deg <= FIT_NEAR_NOISE * summary.noise_deg
+    if ratio <= FIT_AT_NOISE:
+        fit = "at noise"
+    elif ratio <= FIT_NEAR_NOISE:
+        fit = "near noise"
+    else:
+        fit = "within error" if near else "above noise"
+    return {
+        "bad": bad_fit(summary),
+        "fit": fit,
+        "misfit": not near,
+        "rms": _degrees(summary.fit_rms_deg),
+        "noise": _degrees(summary.noise_deg),
+        "times_noise": f"{ratio:.1f}",
+        "error": _degrees(summary.simulator_error_deg),
+        "model_error": _degrees(summary.model_error_deg) if summary.model_error_deg else "",
+        "clean": summary.clean,
+        "converged": summary.sampler_status is SamplerStatus.CONVERGED,
+        "rhat": f"{summary.rhat_max:.3f}",
+        "ess": f"{summary.ess_min:.0f}",
+        "divergent": percent(summary.divergent_share),
+        "least": with_unit("viscosity", summary.least_viscosity),
+        "alike": percent(alike) if alike >= MIN_ALIKE_SHARE else "",
+    }
+
+
+def _parameter(name: str, values: ParameterSummary) -> Facts:
+    """A posterior's interval in its unit, and its numbers for a table."""
+    numbers = {key: f"{value:.3g}" for key, value in vars(values).items()}
+    low, median, high = (with_unit(name, at) for at in (values.q05, values.q50, values.q95))
+    shown = {"low": low, "median": median, "high": high}
+    return {"name": spoken(name), "unit": LIQUID_UNITS.get(name, ""), **numbers, **shown}
+
+
+def _learned(values: ParameterSummary, prior: "NDArray[np.float64]") -> Facts:
+    """What a posterior has learned beside draws (n,) from its prior."""
+    low, high = np.searchsorted(np.sort(prior), (values.q05, values.q95)) / len(prior)
+    share = float(high - low) / 0.9
+    return {
+        "share": percent(share),
+        "learned": share <= UNLEARNED_SHARE,
+        "at_end": bool(low < PRIOR_END or high > 1.0 - PRIOR_END),
+    }
+
+
+def criticism_facts(criticism: Criticism) -> Facts:
+    """Of a criticism: the verdicts, what it accepted, and the rows of its tables."""
+    summary, tree = criticism.summary, criticism.tree
+    stirs = tree.children["stirs"]
+    effects = stirs["effects"].to_dataset()
+    snr, held = dict(_numbers(effects, "snr")), held_out_of(stirs)
+    ranked = sorted(snr.items(), key=lambda item: -item[1])
+    gap, where = summary.gap, [_place(window) for window in summary.where[:MAX_LISTED]]
+    before = criticism.base.summary.parameters
+    return {
+        **verdict_facts(summary),
+        "requested": _spoken(summary.requested),
+        "unsupported": _spoken(summary.unsupported),
+        "accepted": _spoken(summary.accepted),
+        "considered": _spoken(summary.considered),
+        "untested": _spoken(summary.untested),
+        "baseline": summary.baseline,
+        "not_clean": summary.baseline_left_out,
+        "frame_faults": summary.frame_faults,
+        "coefficients": [_coefficient(*item) for item in summary.coefficient.items()],
+        "refit": [
+            {
+                "name": name,
+                "now": summary.parameters[name].interval(name),
+                "before": was.interval(name),
+            }
+            for name, was in before.items()
+            if summary.accepted
+        ],
+        "gap": {name: _degrees(value) for name, value in vars(gap).items()},
+        "usual": bool(gap.usual),
+        "where": where,
+        "more_where": len(summary.where) - len(where),
+        "detectable": {
+            spoken(name): f"{ratio:.0f}" for name, ratio in ranked if ratio >= DETECTABLE_SNR
+        },
+        "undetectable": _spoken(name for name, ratio in snr.items() if ratio < DETECTABLE_SNR),
+        "detectable_from": f"{DETECTABLE_SNR:.0f}",
+        "gains": _gains(effects),
+        "holds": {}
+        if held is None
+        else {spoken(str(one)): bool(held["holds"].sel(explanation=one)) for one in _names(held)},
+        "held_out": [] if held is None else list(_held_out(held)),
+        "effects": {
+            name: list(_effects(tree.children[name]))
+            for name in ("stirs", "pours")
+            if name in tree.children
+        },
+        "suggestions": [
+            {
+                "experiment": one.experiment,
+                "between": _spoken(one.between),
+                "snr": f"{one.snr:.1f}",
+                "helps": one.snr >= DETECTABLE_SNR,
+            }
+            for one in sorted(summary.suggestions, key=lambda one: -one.snr)
+        ],
+        "noise": {
+            "sd": _degrees(summary.noise.sd_deg),
+            "uncertainty": percent(summary.noise.sd_uncertainty),
+            "correlation": f"{summary.noise.correlation:.2f}",
+            "samples": summary.noise.samples,
+        },
+        "simulations": summary.n_simulations,
+        "seconds": f"{summary.seconds:.0f}",
+    }
+
+
+def verdict_facts(summary: CriticismSummary) -> Facts:
+    """The verdicts on all data, on stirs and on pours, and those that are a reason to doubt."""
+    pours = summary.pours
+    everything, stirs = _verdict("all", summary), _verdict("stirs", summary.stirs)
+    poured = None if pours is None else _verdict("pours", pours)
+    # an effect can take up any error that looks like it, also the simulator's own
+    confirmed = summary.accepted and summary.held_out
+    settled = summary.verdict is VerdictKind.AGREEMENT or confirmed
+    unsettled = [] if settled else [everything]
+    # what one source named explains nothing of the other
+    if summary.verdict is not VerdictKind.UNKNOWN:
+        parts = [part for part in (stirs, poured) if part is not None]
+        unsettled += [part for part in parts if part["verdict"] == VerdictKind.UNKNOWN]
+    return {"all": everything, "stirs": stirs, "pours": poured, "unsettled": unsettled}
+
+
+def _verdict(data: str, found: CriticismSummary | SourceVerdict) -> Facts:
+    """A conclusion on "all", "stirs" or "pours"."""
+    facts = {
+        "data": data,
+        "verdict": str(found.verdict),
+        "p": f"{found.p_value:.2g}",
+        "effects": _spoken(found.effects),
+        "confirmed": found.held_out > 0,
+        "refuted": _spoken(found.refuted),
+    }
+    if isinstance(found, PourVerdict):
+        rms = {"before": found.before, "after": found.after}
+        facts |= {when: None if at is None else f"{100 * at:.1f}" for when, at in rms.items()}
+    return facts
+
+
+def _coefficient(name: str, values: ParameterSummary) -> Facts:
+    """How large an accepted effect is, and what it is."""
+    from ..models import EFFECTS
+
+    effect = EFFECTS.get(name)
+    known = {"text": "", "neutral": ""}
+    if effect is not None:
+        known = {"text": effect.text, "neutral": with_unit(name, effect.neutral)}
+    return {**_parameter(name, values), **known}
+
+
+def _place(window: DifferingWindow) -> Facts:
+    """A window in which model and data differ."""
+    ends = (window.start_s, window.stop_s)
+    start, stop = (NONE if end is None else f"{end:.1f}" for end in ends)
+    numbers = {"rms": _degrees(window.rms_deg), "p": f"{window.p_value:.2g}"}
+    return {**vars(window), **numbers, "start": start, "stop": stop}
+
+
+def _gains(effects: "Dataset") -> list[Facts]:
+    """The effects that alone explain most, best first."""
+    p_values = dict(_numbers(effects, "p_value"))
+    ranked = sorted(_numbers(effects, "gain"), key=lambda item: -item[1])
+    return [
+        {"name": spoken(name), "gain": f"{gain:.1f}", "p": f"{p_values[name]:.2g}"}
+        for name, gain in ranked[:MAX_LISTED]
+        if gain > 0.0
+    ]
+
+
+def held_out_of(source: "DataTree") -> "Dataset | None":
+    """The group `held_out` of a source, where it has one."""
+    return source["held_out"].to_dataset() if "held_out" in source.children else None
+
+
+def _held_out(held: "Dataset") -> Iterator[Facts]:
+    """Each explanation on each held-out recording."""
+    for name in _names(held):
+        for recording in held["recording"].to_numpy():
+            gap = held.sel(explanation=name, recording=recording)
+            angles = {key: float(np.degrees(gap[key])) for key in HELD_OUT_ANGLES}
+            yield {
+                "explanation": spoken(str(name)),
+                "recording": str(recording),
+                **{key: _degrees(angle) for key, angle in angles.items()},
+                "p": f"{float(gap['p_value']):.2g}",
+                "gain": f"{float(gap['lpd_gain']):.1f}",
+                "holds": bool(gap["holds"]),
+            }
+
+
+HELD_OUT_ANGLES = ("before", "after", "noise", "floor")
+
+
+def _effects(source: "DataTree") -> Iterator[Facts]:
+    """Each effect considered for a source."""
+    effects, confusion = (source[group].to_dataset() for group in ("effects", "confusion"))
+    for each in effects["effect"].to_numpy():
+        name, found = str(each), effects.sel(effect=each)
+        yield {
+            "name": spoken(name),
+            "typical": _number(found["typical"].item(), ".3g", unit_of(name)),
+            "snr": _number(found["snr"].item(), ".1f"),
+            "similar": _most_similar(name, confusion),
+            "gain": _number(found["gain"].item(), ".1f"),
+            "p": _number(found["p_value"].item(), ".2g"),
+            "coefficient": _number(found["coefficient"].item(), ".3g", unit_of(name)),
+            "status": str(found["status"].item()),
+        }
+
+
+def _most_similar(name: str, confusion: "Dataset") -> str:
+    """The other effect whose signature is most like an effect's, with their cosine."""
+    names = [str(other) for other in confusion["effect"].to_numpy()]
+    if name not in names or len(names) < 2:
+        return NONE
+    cosine = confusion["cosine"].sel(effect=name).to_numpy()
+    others = np.where(np.array(names) == name, 0.0, np.abs(cosine))
+    closest = int(np.argmax(others))
+    return f"{spoken(names[closest])} ({cosine[closest]:.2f})"
+
+
+def pour_facts(pour: Pour) -> Facts:
+    """Of the chosen pour, and of the one that is best for the most probable liquid alone."""
+    summary, cups = pour.summary, json.loads(pour.tree.attrs["cups"])
+    return {
+        **_action(summary),
+        "plug_in": _action(summary.plug_in),
+        "same": summary.plug_in.action == summary.action,
+        "risk": summary.risk,
+        "simulations": summary.n_simulations,
+        "map_error": percent(summary.map_error),
+        "least": with_unit("viscosity", summary.least_viscosity),
+        "contact_angle": f"{cups['source']['contact_angle_deg']:.3g}°",
+        "given": summary.given and _given(summary.given, summary),
+        "ends": _ends(pour.tree) if summary.spillage_q95 >= LEAST_SPILLED else [],
+        "much_spilled": summary.expected_spillage > MUCH_SPILLED,
+        "much_retained": summary.expected_retained > TENTH,
+        "held": f"{cups['pour']['hold']:.2g}",
+        "hold": summary.hold and _hold(summary.hold),
+    }
+
+
+def _action(action: ActionSummary) -> Facts:
+    """An action and what becomes of the liquid."""
+    shares = ("expected_received", "expected_retained")
+    shares += ("received_q05", "received_q95", "retained_q05", "retained_q95")
+    return {
+        **_turn(action),
+        "spilled": spilled(action.expected_spillage),
+        "spilled_q95": at_most(action.spillage_q95),
+        **{name.removeprefix("expected_"): percent(getattr(action, name)) for name in shares},
+    }
+
+
+def _turn(action: ActionSummary | GivenPour) -> Facts:
+    turn, distance = action.angular_velocity_deg_s, action.distance_cm
+    return {"turn": f"{turn:.1f}°/s", "distance": f"{distance:.2f} cm"}
+
+
+def _given(given: GivenSummary, chosen: ActionSummary) -> Facts:
+    """The pours that were made, those most like the chosen one, and what they have changed."""
+    against = given.contradicting
+    return {
+        "file": given.file,
+        "liquid": given.liquid,
+        "count": len(given.lines),
+        "nearest": [_made(one) for one in given.nearest],
+        "contradicting": against and _made(against),
+        "without": _action(given.without) if given.without.action != chosen.action else None,
+    }
+
+
+def _made(pour: GivenPour) -> Facts:
+    """A pour that was made, beside what the map alone expects of it."""
+    return {
+        "line": pour.line,
+        **_turn(pour),
+        "spilled": percent(pour.spilled),
+        "expected": spilled(pour.expected_spillage),
+        "retained": percent(pour.retained),
+        "expected_retained": percent(pour.expected_retained),
+    }
+
+
+def _hold(hold: Hold) -> Facts:
+    """For how long the source must be held; "" where a minute is too short."""
+    enough = hold.until_tenth_s
+    return {
+        "enough": f"{enough:.2g}" if np.isfinite(enough) else "",
+        "extrapolated": enough > hold.simulated_s,
+        "simulated": f"{hold.simulated_s:.2g}",
+        "kept": percent(hold.retained_then),
+    }
+
+
+def _ends(pour: "DataTree") -> list[str]:
+    """The ends of what was allowed at which the chosen pour is; a better one may lie beyond."""
+    actions, chosen = pour["actions"], pour["chosen"].attrs
+    return [
+        PRIOR_ENDS[name, end]
+        for name in ACTION
+        for end, limit in enumerate(actions[name].to_numpy()[[0, -1]])
+        if np.isclose(chosen[name], limit)
+    ]
+
+
+def _numbers(effects: "Dataset", column: str) -> Iterator[tuple[str, float]]:
+    """Effect and number of each row in which the number is known."""
+    names, values = effects["effect"].to_numpy(), effects[column].to_numpy()
+    for name, value in zip(names, values, strict=True):
+        if np.isfinite(value):
+            yield str(name), float(value)
+
+
+def _names(held: "Dataset") -> "NDArray[np.str_]":
+    return held["explanation"].to_numpy()
+
+
+def _spoken(names: Any) -> list[str]:
+    return [spoken(name) for name in names]
+
+
+def _degrees(value: float | None) -> str:
+    """An angle [deg]; "" where there is none."""
+    return "" if value is None else f"{value:.2f}°"
+
+
+def _number(value: float, form: str, unit: str = "") -> str:
+    return f"{value:{form}} {unit}".strip() if np.isfinite(value) else NONE
