@@ -155,7 +155,7 @@ def hover_strips(axes: "Axes", x: "ArrayLike", text_at: Callable[[int], str]) ->
     """
     values = np.asarray(x, float)
     for part in np.array_split(np.arange(len(values)), min(HOVER_STRIPS, len(values))):
-        start, stop = float(values[part[0]]), float(values[min(part[-1] + 1, len(values) - 1)])
+        start, stop = (float(values[at]) for at in (part[0], min(part[-1] + 1, len(values) - 1)))
         hover(axes.axvspan(start, stop, alpha=0.0), text_at(part[len(part) // 2]))
 
 

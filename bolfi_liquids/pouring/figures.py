@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drawing import BLUE, INK, ORANGE, Panels, hover_points, new_figure, panels
+from ..drawing import BLUE, INK, ORANGE, Panels, hover, hover_points, new_figure, panels
 from ..seeds import Phase, generator
 from .spillage import ACTION, RISK
 
@@ -167,10 +167,11 @@ def mark_choices(axes: "Axes", tree: "DataTree") -> None:
     """The chosen action and the plug-in."""
     for name, (colour, marker, label) in CHOICES.items():
         action = tree[name].attrs
-        at = np.degrees(action["angular_velocity"]), 100.0 * action["distance"]
+        turn, apart = np.degrees(action["angular_velocity"]), 100.0 * action["distance"]
         face = colour if name == "chosen" else "none"  # hollow: both stay visible in one place
-        axes.plot(
-            *at,
+        (mark,) = axes.plot(
+            turn,
+            apart,
             marker,
             color=colour,
             markerfacecolor=face,
@@ -179,6 +180,7 @@ def mark_choices(axes: "Axes", tree: "DataTree") -> None:
             clip_on=False,
             zorder=5,
         )
+        hover(mark, f"{label}: {turn:.1f}°/s, {apart:.2f} cm")
 
 
 def draw_outcomes(axes: "Axes", tree: "DataTree") -> None:
