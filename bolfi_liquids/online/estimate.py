@@ -85,6 +85,12 @@ class OnlineEstimate(NamedTuple):
         """Whether the data so far are near enough to a simulation, as `calibrate` asks it."""
         return self.fit_to_noise < BAD_FIT_RATIO and not self.frame_faults
 
+    def is_enough(self, settings: OnlineSettings) -> bool:
+        """Whether the pour is known well enough for stirring to end; never by a bad fit."""
+        spillage = self.spillage_q95 if settings.stop == "bound" else self.expected_spillage
+        enough_strokes = self.strokes >= settings.least_strokes
+        return self.fits and enough_strokes and spillage < settings.target
+
 
 Made = tuple[tuple["Job", "Simulation"], ...]
 """Finished simulations of the whole plan, failed ones included, in the order of their jobs."""
@@ -238,15 +244,6 @@ def fit_to_noise(observed: NDArray, signals: NDArray, viscosity: NDArray) -> flo
     noise = float(np.hypot(sensor_noise(observed), apart))
     left = unexplained(misfits[closest], stirring_error(viscosity[closest]))
     return left / max(noise, float(np.radians(MIN_NOISE_DEG)))
-
-
-def enough(estimate: OnlineEstimate, settings: OnlineSettings) -> bool:
-    """Whether the pour is known well enough for stirring to end; never by a bad fit."""
-    if not estimate.fits:
-        return False
-    bound = settings.stop == "bound"
-    spillage = estimate.spillage_q95 if bound else estimate.expected_spillage
-    return estimate.strokes >= settings.least_strokes and spillage < settings.target
 
 
 def _engine(problem: Problem, observed: NDArray, seed: int) -> "Bolfi":

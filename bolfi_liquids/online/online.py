@@ -10,9 +10,8 @@ status.
 import json
 import os
 import time
-from collections import deque
 from collections.abc import Callable, Mapping
-from concurrent.futures import BrokenExecutor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import ExitStack
 from enum import StrEnum
 from functools import partial
@@ -35,7 +34,7 @@ from ..run.lock import alone_in
 from ..run.run import RUN_TOML
 from ..run.workers import background_process
 from ..simulators import PourSimulator, stir_simulator
-from .estimate import Answer, Made, OnlineEstimate, Problem, answer, design, enough, proposals
+from .estimate import Answer, Made, OnlineEstimate, Problem, answer, design, proposals
 from .plan import Aligned, PartialRecording, planned, stroke_ends
 from .settings import OnlineSettings
 from .simulate import simulate_plan
@@ -158,7 +157,7 @@ class OnlineCalibration:
         self._map: LandingMap | None = None
         self._aligned: Aligned | None = None  # what was learned from last
         self._unread: PartialRecording | None = None
-        self._in_flight: deque[tuple[list[Job], Future[list[Simulation]]]] = deque()
+        self._simulating: tuple[list[Job], Future[list[Simulation]]] | None = None
         self._no_more = ""  # why nothing is simulated any more
         self._learning: tuple[Future[Any], Callable[[Any], None]] | None = None
         self._resources = resources
@@ -218,13 +217,15 @@ class OnlineCalibration:
             ):
                 poured = pours_in(box, pours, settings.pours, Compute(bank=kept), advance)
             learn = partial(learn_map, box, cups, poured)
-            simulate = partial(simulate_plan, problem.stirring, bank)
+            # side by side: nothing else is urgent before the robot moves
+            batch = max(settings.in_flight, os.cpu_count() or 1)
+            simulate = partial(simulate_plan, problem.stirring, bank, batch)
             return cls(problem, out, learn, simulate, resources.pop_all())
 
     @property
     def status(self) -> Status:
         """How it was doing at the last `poll` or `update`."""
-        in_flight = sum(len(jobs) for jobs, _ in self._in_flight)
+        in_flight = 0 if self._simulating is None else len(self._simulating[0])
         detail = self._no_more if self._phase == OnlinePhase.READY else self._detail
         return Status(self._phase, detail, len(self._made), in_flight)
 
@@ -268,10 +269,6 @@ class OnlineCalibration:
             except Exception as error:
                 self._fail(f"{type(error).__name__}: {error}")
         return self.estimates[-1] if len(self.estimates) > before else None
-
-    def enough(self, estimate: OnlineEstimate) -> bool:
-        """Whether the pour is known well enough for stirring to end; see `OnlineSettings`."""
-        return enough(estimate, self.settings)
 
     def finish(self, recording: Source, *, budget: int = 20, progress: bool = True) -> Path:
         """Calibrate on the finished recording by the ordinary `calibrate`, into `out`.
@@ -324,7 +321,7 @@ class OnlineCalibration:
             self._fail(self._no_more)
         elif self._map is not None:
             self._detail = "simulating the plan"
-            if not self._in_flight:
+            if self._simulating is None:
                 self._phase = OnlinePhase.READY
 
     def _go_on(self) -> None:
@@ -334,7 +331,7 @@ class OnlineCalibration:
             state = self._problem, self._made, self._map, known, self._unread
             self._unread = None
             self._learn(self._take_answer, answer, *state)
-        elif self._aligned is not None and not self._in_flight and not self._no_more:
+        elif self._aligned is not None and self._simulating is None and not self._no_more:
             n = min(self.settings.in_flight, self.settings.budget - len(self._made))
             if n > 0:
                 state = self._problem, self._made, self._aligned.observed, n
@@ -342,12 +339,10 @@ class OnlineCalibration:
 
     def _learn(self, take: Callable[[Any], None], task: Callable[..., Any], *given: Any) -> None:
         """Give the process that learns a task; `take` gets its result."""
-        self._learning = self._learner.submit(task, *given), take
+        self._learning = _submitted(self._learner, task, *given), take
 
     def _take_design(self, jobs: "list[Job]") -> None:
-        side_by_side = os.cpu_count() or 1  # nothing is urgent before the robot moves
-        for start in range(0, len(jobs), side_by_side):
-            self._simulate(jobs[start : start + side_by_side])
+        self._simulate(jobs)
         self._detail = "learning the map of landings"
         self._learn(self._take_map, self._learn_map)
 
@@ -365,36 +360,28 @@ class OnlineCalibration:
                 log.write(json.dumps(found.estimate.as_record()) + "\n")
 
     def _simulate(self, jobs: "list[Job]") -> None:
-        try:
-            future = self._simulator.submit(self._simulate_plan, jobs)
-        except BrokenExecutor as error:
-            self._go_alone(error)
-        else:
-            self._in_flight.append((jobs, future))
+        self._simulating = jobs, _submitted(self._simulator, self._simulate_plan, jobs)
 
     def _take_simulations(self) -> None:
-        while self._in_flight and self._in_flight[0][1].done():
-            jobs, future = self._in_flight.popleft()
-            try:
-                self._made += tuple(zip(jobs, future.result(), strict=True))
-            except Exception as error:
-                self._go_alone(error)
-
-    def _go_alone(self, error: Exception) -> None:
-        """Go on with the simulations that there are."""
-        died = isinstance(error, BrokenExecutor)
-        self._no_more = (
-            "the process that simulates has died"
-            if died
-            else f"the plan cannot be simulated: {type(error).__name__}: {error}"
-        )
-        self._drop_in_flight()
+        if self._simulating is None or not self._simulating[1].done():
+            return
+        (jobs, future), self._simulating = self._simulating, None
+        try:
+            self._made += tuple(zip(jobs, future.result(), strict=True))
+        except BrokenExecutor:  # the others are enough for estimates
+            self._no_more = "the process that simulates has died"
+        except Exception as error:
+            self._no_more = f"the plan cannot be simulated: {type(error).__name__}: {error}"
 
     def _fail(self, detail: str) -> None:
-        self._phase, self._detail = OnlinePhase.FAILED, detail
-        self._drop_in_flight()
+        self._phase, self._detail, self._simulating = OnlinePhase.FAILED, detail, None
 
-    def _drop_in_flight(self) -> None:
-        for _, future in self._in_flight:
-            future.cancel()
-        self._in_flight.clear()
+
+def _submitted(executor: Executor, task: Callable[..., Any], *given: Any) -> Future[Any]:
+    """The future of a task, also where the executor's process has died already."""
+    try:
+        return executor.submit(task, *given)
+    except BrokenExecutor as error:
+        failed: Future[Any] = Future()
+        failed.set_exception(error)
+        return failed

@@ -153,7 +153,7 @@ class _Stirring:
         if status.phase in (OnlinePhase.FAILED, OnlinePhase.REFUSED):
             self._view.warn(f"calibration {status.phase}: {status.detail}")
         if estimate is not None:
-            self._enough = self._calibration.enough(estimate)
+            self._enough = estimate.is_enough(self._calibration.settings)
             if not estimate.fits:
                 self._view.warn(BAD_FIT)
                 for fault in estimate.frame_faults:

@@ -19,7 +19,6 @@ from bolfi_liquids.online.estimate import (
     Problem,
     answer,
     design,
-    enough,
     estimate,
     fit_to_noise,
     proposals,
@@ -201,7 +200,7 @@ def test_an_estimate_is_as_late_as_its_stroke_ended_before_it():
 )
 def test_it_is_enough_when_what_was_asked_for_is_under_the_target(stop, target, strokes, ends):
     found = OnlineEstimate(strokes, 1.0, {}, {}, 0.01, 0.03, 16, 0.1, 0.0, 0.0, ())
-    assert enough(found, OnlineSettings(stop=stop, target=target)) is ends
+    assert found.is_enough(OnlineSettings(stop=stop, target=target)) is ends
 
 
 def test_an_estimate_that_fits_nothing_says_so_and_ends_nothing():
@@ -210,11 +209,11 @@ def test_an_estimate_that_fits_nothing_says_so_and_ends_nothing():
     found = estimate(of, known, good, NoMap(), 0.0)
     assert found.fits and 0.5 < found.fit_to_noise < BAD_FIT_RATIO
     settings = OnlineSettings(target=0.99)
-    assert enough(found, settings)
+    assert found.is_enough(settings)
     wrong = good._replace(observed=good.observed + 0.2)  # the zero of a camera is elsewhere
     lost = estimate(of, known, wrong, NoMap(), 0.0)
     assert lost.fit_to_noise > BAD_FIT_RATIO and not lost.fits
-    assert not enough(lost, settings)
+    assert not lost.is_enough(settings)
     assert BAD_FIT in sentence(lost) and BAD_FIT not in sentence(found)
 
 

@@ -78,7 +78,7 @@ def replay(recording, of, *, realtime=False):
         before = len(of.estimates)
         of.update(so_far(recording, end))
         assert realtime or until(lambda before=before: len(of.estimates) > before, of), of.status
-        if any(map(of.enough, of.estimates[-1:])):
+        if any(one.is_enough(of.settings) for one in of.estimates[-1:]):
             break
     return of.estimates
 
