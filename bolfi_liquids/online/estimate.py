@@ -132,7 +132,7 @@ class Answer(NamedTuple):
 
 def design(problem: Problem) -> "list[Job]":
     """The simulations to make before the robot moves: all over the prior."""
-    engine = _engine(problem, np.zeros(problem.shape), problem.settings.seed)
+    engine = _engine(problem, (), np.zeros(problem.shape), problem.settings.seed)
     return _jobs(problem, engine.ask(problem.settings.design), 0)
 
 
@@ -147,7 +147,7 @@ def proposals(problem: Problem, made: Made, observed: NDArray, n: int) -> "list[
     """
     # the rule's own jitter must differ from one call to the next
     (seed,) = simulation_seeds(problem.settings.seed, Phase.ONLINE_SEARCH, 1, len(made))
-    return _jobs(problem, _told(problem, made, observed, seed).ask(n), len(made))
+    return _jobs(problem, _engine(problem, made, observed, seed).ask(n), len(made))
 
 
 def answer(
@@ -196,7 +196,7 @@ def estimate(
     """
     from ..inference.sampling.convergence import ConvergenceStatus
 
-    engine = _told(problem, made, aligned.observed, problem.settings.seed)
+    engine = _engine(problem, made, aligned.observed, problem.settings.seed)
     fit = engine.fit(warn=False)  # warnings are among the estimate's complaints
     seed, (plan,) = problem.settings.seed, problem.stirring.recordings
     tree = fit.sample("quadrature", chains=2, draws=DRAWS_EACH, seed=seed, warn=False)
@@ -246,12 +246,14 @@ def fit_to_noise(observed: NDArray, signals: NDArray, viscosity: NDArray) -> flo
     return left / max(noise, float(np.radians(MIN_NOISE_DEG)))
 
 
-def _engine(problem: Problem, observed: NDArray, seed: int) -> "Bolfi":
+def _engine(problem: Problem, made: Made, observed: NDArray, seed: int) -> "Bolfi":
+    """The engine with the simulations so far."""
     from ..inference import Bolfi
+    from ..inference.simulations import columns, stacked
 
     settings = problem.settings
     paper: dict[str, Any] = PAPER_RULES
-    return Bolfi(
+    engine = Bolfi(
         problem.prior,
         observed,
         surrogate=settings.surrogate,
@@ -260,12 +262,6 @@ def _engine(problem: Problem, observed: NDArray, seed: int) -> "Bolfi":
         discrepancy=problem.stirring.discrepancy(),
         **(paper if settings.surrogate == "discrepancy" else {}),
     )
-
-
-def _told(problem: Problem, made: Made, observed: NDArray, seed: int) -> "Bolfi":
-    from ..inference.simulations import columns, stacked
-
-    engine = _engine(problem, observed, seed)
     if made:
         theta, seeds = columns([job for job, _ in made])
         engine.tell(theta, stacked([result for _, result in made], problem.shape), seeds)

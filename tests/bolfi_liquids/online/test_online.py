@@ -4,8 +4,6 @@ import json
 import os
 import signal
 import sqlite3
-import subprocess
-import sys
 import time
 from dataclasses import replace
 from multiprocessing import active_children
@@ -20,7 +18,6 @@ from bolfi_liquids.online import online
 from bolfi_liquids.online.online import OnlineCalibration, OnlineChoice, OnlinePhase
 from bolfi_liquids.online.plan import PartialRecording
 from bolfi_liquids.online.settings import OnlineSettings
-from bolfi_liquids.run.workers import background_process
 
 # the process that simulates gives way to others: beside another test it gets little
 PATIENCE_S = 600
@@ -101,9 +98,11 @@ def story(short_recording, tmp_path_factory):
         told.early = of.status
         told.ready = of.wait_until_ready(PATIENCE_S)
         told.status = of.status
-        for number, end in enumerate(of.ends[:2], start=1):
-            of.update(so_far(recording, end))
-            assert until(lambda number=number: len(of.estimates) == number, of), of.status
+        of.update(so_far(recording, of.ends[0]))
+        of.update(so_far(recording, of.ends[1], off=0.01))  # waits, and is replaced
+        of.update(so_far(recording, of.ends[1]))
+        told.phases = {of.status.phase}
+        assert until(lambda: told.phases.add(of.status.phase) or len(of.estimates) == 2, of)
         told.estimates = list(of.estimates)
         until(lambda: of.status.simulations > SMALL.design, of)
         told.later = of.status
@@ -144,6 +143,11 @@ def test_every_stroke_is_answered(story):
         assert 0.0 <= one.expected_spillage <= one.spillage_q95 <= 1.0
         assert 0.0 < one.lag < PATIENCE_S
         assert one.simulations >= SMALL.design
+
+
+@pytest.mark.slow
+def test_data_that_wait_are_replaced_by_newer_ones(story):
+    assert story.phases == {OnlinePhase.READY}
 
 
 @pytest.mark.slow
@@ -200,48 +204,6 @@ def test_death_is_a_status_and_disturbs_nobody(story):
     assert story.after is None
     running = {child.pid for child in active_children()}
     assert not running & {story.learner.pid, story.simulator.pid}
-
-
-@pytest.mark.slow
-def test_leaving_ends_work_that_takes_long():
-    began = time.monotonic()
-    with background_process(0) as executor:
-        pid = executor.submit(os.getpid).result()
-        executor.submit(time.sleep, PATIENCE_S)
-    assert time.monotonic() - began < PATIENCE_S / 2
-    assert pid not in {child.pid for child in active_children()}
-
-
-@pytest.mark.slow
-def test_ctrl_c_is_left_to_the_process_that_supervises():
-    with background_process(0) as executor:
-        pid = executor.submit(os.getpid).result()
-        os.kill(pid, signal.SIGINT)
-        assert executor.submit(os.getpid).result() == pid
-
-
-KILLED = """
-import os, signal, time
-from bolfi_liquids.run.workers import background_process
-
-if __name__ == "__main__":
-    with background_process(0) as executor:
-        print(executor.submit(os.getpid).result(), flush=True)
-        executor.submit(time.sleep, 600)
-        os.kill(os.getpid(), signal.SIGKILL)
-"""
-
-
-@pytest.mark.slow
-def test_a_process_ends_with_its_killed_parent(tmp_path):
-    script = tmp_path / "killed.py"
-    script.write_text(KILLED)
-    done = subprocess.run([sys.executable, script], stdout=subprocess.PIPE, text=True, timeout=300)
-    assert done.returncode == -signal.SIGKILL
-    ends = time.monotonic() + 60.0
-    while os.path.exists(f"/proc/{int(done.stdout)}") and time.monotonic() < ends:
-        time.sleep(0.1)
-    assert not os.path.exists(f"/proc/{int(done.stdout)}")
 
 
 @pytest.mark.slow
