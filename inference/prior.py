@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from functools import cached_property
+from typing import Any
 
 import jax
 import numpy as np
@@ -56,6 +57,11 @@ class Prior:
             )
         self.units = dict(units or {})
         self._bounds = {name: u.bounds for name, u in self._univariate.items()}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # a module of SciPy that unpickling imports before `scipy.stats` is imported twice, and
+        # what was made by the first cannot be pickled again
+        return Prior, (self.distributions, self.units)
 
     @property
     def names(self) -> tuple[str, ...]:

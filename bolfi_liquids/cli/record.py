@@ -19,7 +19,7 @@ from .options import ExecutionOptions, RigOption
 
 if TYPE_CHECKING:
     from ..hardware import Check, HiddenLiquid
-    from ..online.online_choice import OnlineChoice
+    from ..online.online import OnlineChoice
 
 OUT = Path("runs/recording")
 EPILOG = examples(
@@ -81,7 +81,7 @@ class OnlineOptions:
     def choice(self, cycles: int | None) -> "OnlineChoice | None":
         """What to calibrate, with so many cycles at the most; None for nothing."""
         from ..inputs.cups import open_cups
-        from ..online.online_choice import USUAL_CYCLES, OnlineChoice
+        from ..online.online import USUAL_CYCLES, OnlineChoice
 
         if self.calibrate is None:
             return None

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from ..calibration.noise import rms, sensor_noise
 from ..calibration.summary import BAD_FIT_RATIO, MIN_NOISE_DEG, unexplained
+from ..errors import InputError
 from ..inputs.frame import frame_faults
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from ..models import stirring_error
 from ..pouring.landing_map import LandingMap
 from ..seeds import Phase, simulation_seeds
 from ..simulators import StirSimulator
-from .plan import Followed
+from .plan import Aligned, PartialRecording, align, stroke_ends
 from .settings import OnlineSettings
 
 if TYPE_CHECKING:
@@ -74,23 +75,25 @@ class OnlineEstimate(NamedTuple):
     fit_to_noise: float = 0.0
     frame_faults: tuple[str, ...] = ()
 
+    def as_record(self) -> dict[str, Any]:
+        """As `online.jsonl` has it."""
+        parameters = {name: spread._asdict() for name, spread in self.parameters.items()}
+        return self._asdict() | {"parameters": parameters}
+
     @property
     def fits(self) -> bool:
         """Whether the data so far are near enough to a simulation, as `calibrate` asks it."""
         return self.fit_to_noise < BAD_FIT_RATIO and not self.frame_faults
 
+    def is_enough(self, settings: OnlineSettings) -> bool:
+        """Whether the pour is known well enough for stirring to end; never by a bad fit."""
+        spillage = self.spillage_q95 if settings.stop == "bound" else self.expected_spillage
+        enough_strokes = self.strokes >= settings.least_strokes
+        return self.fits and enough_strokes and spillage < settings.target
 
-class Made(NamedTuple):
-    """Finished simulations of the whole plan, n of them; failed ones are rows of NaN."""
 
-    theta: dict[str, NDArray[np.float64]]  # name -> (n,)
-    signals: NDArray[np.float64]  # (n, T, 2) rad
-    seeds: NDArray[np.int64]  # (n,)
-
-    @property
-    def size(self) -> int:
-        """n"""
-        return len(self.seeds)
+Made = tuple[tuple["Job", "Simulation"], ...]
+"""Finished simulations of the whole plan, failed ones included, in the order of their jobs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,57 +115,79 @@ class Problem:
         """Of one signal."""
         return self.stirring.observed.shape
 
-    @property
-    def nothing(self) -> Made:
-        """No simulation."""
-        none = np.zeros(0)
-        return Made(
-            dict.fromkeys(self.prior.names, none), np.zeros((0, *self.shape)), none.astype(int)
-        )
 
+class Answer(NamedTuple):
+    """What data so far have led to.
 
-def with_results(made: Made, jobs: "list[Job]", results: "list[Simulation]") -> Made:
-    """What was made, with the results of `jobs` at its end."""
-    from ..inference.simulations import stacked
+    Attributes:
+        aligned: The data, if they tell more than those before.
+        estimate: From them.
+        refusal: Why they cannot be used; "" if they can.
+    """
 
-    signals = stacked(results, made.signals.shape[1:])
-    return Made(
-        {name: np.append(v, [job.theta[name] for job in jobs]) for name, v in made.theta.items()},
-        np.concatenate([made.signals, signals]),
-        np.append(made.seeds, [job.seed for job in jobs]),
-    )
+    aligned: Aligned | None = None
+    estimate: OnlineEstimate | None = None
+    refusal: str = ""
 
 
 def design(problem: Problem) -> "list[Job]":
     """The simulations to make before the robot moves: all over the prior."""
-    engine = _engine(problem, np.zeros(problem.shape), problem.settings.seed)
+    engine = _engine(problem, (), np.zeros(problem.shape), problem.settings.seed)
     return _jobs(problem, engine.ask(problem.settings.design), 0)
 
 
-def proposals(problem: Problem, made: Made, observed: NDArray, first: int, n: int) -> "list[Job]":
+def proposals(problem: Problem, made: Made, observed: NDArray, n: int) -> "list[Job]":
     """The simulations that the data so far make worth while.
 
     Args:
         problem: What stays the same.
         made: Simulations so far.
-        observed: Of `follow`.
-        first: Number of the first one, counted from the run's start.
+        observed: Of `align`.
         n: How many.
     """
     # the rule's own jitter must differ from one call to the next
-    (seed,) = simulation_seeds(problem.settings.seed, Phase.ONLINE_SEARCH, 1, first)
-    return _jobs(problem, _told(problem, made, observed, seed).ask(n), first)
+    (seed,) = simulation_seeds(problem.settings.seed, Phase.ONLINE_SEARCH, 1, len(made))
+    return _jobs(problem, _engine(problem, made, observed, seed).ask(n), len(made))
+
+
+def answer(
+    problem: Problem, made: Made, landing_map: LandingMap, known: int, so_far: PartialRecording
+) -> Answer:
+    """An estimate if another stroke is finished, or why the data cannot be used.
+
+    Args:
+        problem: What stays the same.
+        made: Simulations so far.
+        landing_map: Of the pour's cups.
+        known: Finished strokes of the data before.
+        so_far: The data.
+    """
+    (plan,) = problem.stirring.recordings
+    try:
+        aligned = align(plan, stroke_ends(plan), so_far)
+    except InputError as error:  # later data may be used
+        return Answer(refusal=str(error))
+    if aligned.refusal:
+        return Answer(refusal=aligned.refusal)
+    if aligned.strokes <= known or not np.isfinite(aligned.observed).any():
+        return Answer()
+    later = float(so_far.time[-1]) - aligned.covered - aligned.delay
+    try:
+        found = estimate(problem, made, aligned, landing_map, so_far.ended - later)
+    except ValueError as error:
+        return Answer(aligned, refusal=str(error))
+    return Answer(aligned, found)
 
 
 def estimate(
-    problem: Problem, made: Made, followed: Followed, landing_map: LandingMap, ended: float
+    problem: Problem, made: Made, aligned: Aligned, landing_map: LandingMap, ended: float
 ) -> OnlineEstimate:
     """Posterior and best pour, given the data so far.
 
     Args:
         problem: What stays the same.
         made: Simulations so far.
-        followed: The data.
+        aligned: The data.
         landing_map: Of the pour's cups.
         ended: When the last finished stroke ended, by `time.monotonic` [s].
 
@@ -171,7 +196,7 @@ def estimate(
     """
     from ..inference.sampling.convergence import ConvergenceStatus
 
-    engine = _told(problem, made, followed.observed, problem.settings.seed)
+    engine = _engine(problem, made, aligned.observed, problem.settings.seed)
     fit = engine.fit(warn=False)  # warnings are among the estimate's complaints
     seed, (plan,) = problem.settings.seed, problem.stirring.recordings
     tree = fit.sample("quadrature", chains=2, draws=DRAWS_EACH, seed=seed, warn=False)
@@ -182,19 +207,19 @@ def estimate(
     good = np.isfinite(fit.history.signals).all(axis=(1, 2))
     viscosity = fit.history.theta[:, problem.prior.names.index("viscosity")]
     return OnlineEstimate(
-        strokes=followed.strokes,
-        covered=followed.covered,
+        strokes=aligned.strokes,
+        covered=aligned.covered,
         parameters={name: _spread(values) for name, values in draws.items()},
         action=pour.action,
         expected_spillage=pour.expected_spillage,
         spillage_q95=pour.spillage_q95,
         simulations=engine.succeeded,
         lag=time.monotonic() - ended,
-        delay=followed.delay,
-        apart=followed.apart,
+        delay=aligned.delay,
+        apart=aligned.apart,
         complaints=(*fit.warnings, *([] if status == ConvergenceStatus.CONVERGED else [status])),
-        fit_to_noise=fit_to_noise(followed.observed, fit.history.signals[good], viscosity[good]),
-        frame_faults=tuple(frame_faults(replace(plan, inclination=followed.observed))),
+        fit_to_noise=fit_to_noise(aligned.observed, fit.history.signals[good], viscosity[good]),
+        frame_faults=tuple(frame_faults(replace(plan, inclination=aligned.observed))),
     )
 
 
@@ -221,21 +246,14 @@ def fit_to_noise(observed: NDArray, signals: NDArray, viscosity: NDArray) -> flo
     return left / max(noise, float(np.radians(MIN_NOISE_DEG)))
 
 
-def enough(estimate: OnlineEstimate, settings: OnlineSettings) -> bool:
-    """Whether the pour is known well enough for stirring to end; never by a bad fit."""
-    if not estimate.fits:
-        return False
-    bound = settings.stop == "bound"
-    spillage = estimate.spillage_q95 if bound else estimate.expected_spillage
-    return estimate.strokes >= settings.least_strokes and spillage < settings.target
-
-
-def _engine(problem: Problem, observed: NDArray, seed: int) -> "Bolfi":
+def _engine(problem: Problem, made: Made, observed: NDArray, seed: int) -> "Bolfi":
+    """The engine with the simulations so far."""
     from ..inference import Bolfi
+    from ..inference.simulations import columns, stacked
 
     settings = problem.settings
     paper: dict[str, Any] = PAPER_RULES
-    return Bolfi(
+    engine = Bolfi(
         problem.prior,
         observed,
         surrogate=settings.surrogate,
@@ -244,12 +262,9 @@ def _engine(problem: Problem, observed: NDArray, seed: int) -> "Bolfi":
         discrepancy=problem.stirring.discrepancy(),
         **(paper if settings.surrogate == "discrepancy" else {}),
     )
-
-
-def _told(problem: Problem, made: Made, observed: NDArray, seed: int) -> "Bolfi":
-    engine = _engine(problem, observed, seed)
-    if made.size:
-        engine.tell(made.theta, made.signals, made.seeds)
+    if made:
+        theta, seeds = columns([job for job, _ in made])
+        engine.tell(theta, stacked([result for _, result in made], problem.shape), seeds)
     return engine
 
 

@@ -23,7 +23,7 @@ MOVED_DISTANCE = 5e-3  # m from which the delay shows
 END_SLACK = 1e-3  # s by which a stroke may seem to lack its end, as the delay is only estimated
 
 
-class SoFar(NamedTuple):
+class PartialRecording(NamedTuple):
     """A recording while it is made; times are the robot clock's since the plan began.
 
     Attributes:
@@ -39,7 +39,7 @@ class SoFar(NamedTuple):
     ended: float
 
 
-class Followed(NamedTuple):
+class Aligned(NamedTuple):
     """Data along the plan.
 
     Attributes:
@@ -98,7 +98,7 @@ def stroke_ends(plan: Recording) -> NDArray[np.float64]:
     return np.array(ends[:-1] if still and len(ends) > 1 else ends)
 
 
-def follow(plan: Recording, ends: NDArray, so_far: SoFar) -> Followed:
+def align(plan: Recording, ends: NDArray, so_far: PartialRecording) -> Aligned:
     """Bring data onto the plan's times, cut after the last finished stroke.
 
     Each stroke is shifted by a delay of its own: a control loop that misses periods delays all
@@ -123,10 +123,10 @@ def follow(plan: Recording, ends: NDArray, so_far: SoFar) -> Followed:
     change = np.diff(delays, prepend=0.0)
     refusal = _refusal(float(change[np.abs(change).argmax()]), apart)
     delay = float(delays[max(done - 1, 0)])
-    return Followed(observed, done, covered, delay, apart, refusal)
+    return Aligned(observed, done, covered, delay, apart, refusal)
 
 
-def _check(so_far: SoFar) -> None:
+def _check(so_far: PartialRecording) -> None:
     size = len(so_far.time)
     shapes = (so_far.time.shape, so_far.position.shape, so_far.inclination.shape)
     if size < 2 or shapes != ((size,), (size, 3), (size, 2)):
@@ -141,7 +141,9 @@ def _check(so_far: SoFar) -> None:
         raise InputError("fewer than two positions", where="data so far", fix="wait for the arm")
 
 
-def _delays(plan: Recording, ends: NDArray, so_far: SoFar) -> tuple[NDArray[np.float64], float]:
+def _delays(
+    plan: Recording, ends: NDArray, so_far: PartialRecording
+) -> tuple[NDArray[np.float64], float]:
     """Of each finished stroke and of the one that is not [s], and the arm's greatest distance.
 
     Returns:
@@ -202,11 +204,11 @@ def _refusal(change: float, apart: float) -> str:
         what = "lost" if change > 0 else "gained"
         return (
             f"the arm {what} {1e3 * abs(change):.0f} ms on its plan in one stroke, more than "
-            f"{1e3 * MAX_DELAY_CHANGE:.0f} ms: what is simulated is not what it does"
+            f"{1e3 * MAX_DELAY_CHANGE:.0f} ms: the simulated motion differs from the arm's"
         )
     if apart > MAX_OFF_PLAN:
         return (
             f"the arm is {1e3 * apart:.1f} mm off its plan, more than {1e3 * MAX_OFF_PLAN:.0f} mm: "
-            "what is simulated is not what it does"
+            "the simulated motion differs from the arm's"
         )
     return ""

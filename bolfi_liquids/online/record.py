@@ -22,10 +22,8 @@ from ..robot.stir import (
     stir_session,
     stir_task,
 )
-from .online import OnlineCalibration
-from .online_choice import OnlineChoice
-from .plan import SoFar
-from .request import OnlinePhase
+from .online import OnlineCalibration, OnlineChoice, OnlinePhase
+from .plan import PartialRecording
 
 if TYPE_CHECKING:
     from ..hardware import HiddenLiquid, Rig, Session
@@ -33,8 +31,8 @@ if TYPE_CHECKING:
     from .estimate import OnlineEstimate
 
 BAD_FIT = (
-    "no simulation comes near the data so far, or they are not told in one frame: do not rely on "
-    "this estimate; stirring does not end by it"
+    "the fit is bad; the gripper's and the camera's frames may differ: do not rely on this "
+    "estimate; stirring does not end by it"
 )
 PLAN_RATE = 30.0  # Hz, of the simulated plan; the cameras'
 FOLLOWED_AFTER = (
@@ -157,7 +155,7 @@ class _Stirring:
         if status.phase in (OnlinePhase.FAILED, OnlinePhase.REFUSED):
             self._view.warn(f"calibration {status.phase}: {status.detail}")
         if estimate is not None:
-            self._enough = self._calibration.enough(estimate)
+            self._enough = estimate.is_enough(self._calibration.settings)
             if not estimate.fits:
                 self._view.warn(BAD_FIT)
                 for fault in estimate.frame_faults:
@@ -201,7 +199,7 @@ def _still(rig: "Rig", pose: np.ndarray) -> "PosePath":
     return PosePath(times, np.tile(pose, (len(times), 1)), stirring=True)
 
 
-def _so_far(directory: Path, ended: float) -> SoFar | None:
+def _so_far(directory: Path, ended: float) -> PartialRecording | None:
     """The data so far; None while they are too few."""
     from ..hardware import RigError
     from ..hardware.recorder.finalise import partial
@@ -210,4 +208,4 @@ def _so_far(directory: Path, ended: float) -> SoFar | None:
         stir = partial(directory)
     except RigError:
         return None
-    return SoFar(stir.time, stir.position, stir.inclination, ended)
+    return PartialRecording(stir.time, stir.position, stir.inclination, ended)

@@ -39,25 +39,58 @@ def processes(count: int | None = None) -> Iterator[Executor | None]:
     try:
         yield pool
     except BaseException:
-        # there is no public way before Python 3.14
-        for worker in list((pool._processes or {}).values()):
-            worker.terminate()
-        pool.shutdown(cancel_futures=True)
+        _give_up(pool)
         raise
     pool.shutdown()
 
 
+@contextmanager
+def background_process(niceness: int) -> Iterator[Executor]:
+    """Start one worker process that gives way to others. Its work is given up when the `with` ends.
+
+    It is spawned, and ignores Ctrl-C, which the process that started it handles.
+
+    Args:
+        niceness: How much is added to the niceness of this process.
+    """
+    pool = ProcessPoolExecutor(
+        1, mp_context=get_context("spawn"), initializer=_begin_behind, initargs=(niceness,)
+    )
+    try:
+        yield pool
+    finally:
+        _give_up(pool)
+
+
+def _give_up(pool: ProcessPoolExecutor) -> None:
+    # there is no public way before Python 3.14
+    for worker in list((pool._processes or {}).values()):
+        worker.terminate()
+    pool.shutdown(cancel_futures=True)
+
+
 def _begin(threads: int) -> None:
     """Simulate by so many threads, and exit silently on Ctrl-C, unless SIGINT is ignored, and when
-    the parent process ends, even by `kill -9`."""
+    the parent process ends."""
     # a process that takes all processors spreads few simulations over all, half of its lanes empty
     os.environ.setdefault(THREADS, str(threads))
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    _end_with_parent()
+
+
+def _begin_behind(niceness: int) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(niceness)
+    _end_with_parent()
+
+
+def _end_with_parent() -> None:
+    """Exit silently when the parent process ends, even by `kill -9`."""
 
     def follow(parent: BaseProcess) -> None:
         parent.join()
         os._exit(1)
 
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
     if parent := parent_process():
         Thread(target=follow, args=(parent,), daemon=True).start()

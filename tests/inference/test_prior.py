@@ -1,3 +1,7 @@
+import pickle
+import subprocess
+import sys
+
 import jax
 import numpy as np
 import numpyro.distributions as dist
@@ -22,6 +26,16 @@ def mixed():
 def test_round_trip_between_units_and_quantiles(mixed):
     u = np.random.default_rng(0).uniform(size=(50, 3))
     np.testing.assert_allclose(mixed.to_unit(mixed.from_unit(u)), u, atol=1e-6)
+
+
+def test_a_process_that_gets_a_prior_can_send_it_back(mixed):
+    back = "import pickle, sys; pickle.dump(pickle.load(sys.stdin.buffer), sys.stdout.buffer)"
+    sent = pickle.dumps(mixed)
+    done = subprocess.run([sys.executable, "-c", back], input=sent, capture_output=True)
+    again = pickle.loads(done.stdout)
+    u = np.random.default_rng(0).uniform(size=(50, 3))
+    for name, values in mixed.from_unit(u).items():
+        np.testing.assert_array_equal(again.from_unit(u)[name], values)
 
 
 def test_quantiles_agree_with_scipy(mixed):

@@ -136,9 +136,8 @@ def test_a_disk_without_room_ends_the_recording_and_is_named_with_its_file(tmp_p
 # `test_online` has the same with a recording that is there, this module the recording
 @pytest.mark.minutes
 def test_stirring_ends_when_the_pour_is_known_well_enough(tmp_path):
-    from bolfi_liquids.online.online_choice import OnlineChoice
+    from bolfi_liquids.online.online import OnlineChoice, OnlineSettings
     from bolfi_liquids.online.record import record_online
-    from bolfi_liquids.online.settings import OnlineSettings
 
     # a coarse map, and a target that any estimate meets once enough strokes were made
     settings = OnlineSettings(target=0.9, design=8, budget=12, pours=64, particles=300)

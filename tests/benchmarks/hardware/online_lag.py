@@ -18,8 +18,7 @@ from bolfi_liquids.hardware import HiddenLiquid, SessionStopped, bundled_rig
 from bolfi_liquids.hardware.recorder.events import read_events
 
 from bolfi_liquids.online.estimate import OnlineEstimate
-from bolfi_liquids.online.online import LOG
-from bolfi_liquids.online.online_choice import USUAL_CYCLES, OnlineChoice
+from bolfi_liquids.online.online import LOG, USUAL_CYCLES, OnlineChoice
 from bolfi_liquids.online.record import record_online, sentence
 
 VISCOSITIES = (1.0, 0.1, 0.01)  # Pa s

@@ -1,10 +1,12 @@
 """Estimates from data so far: the paper's integral up to then, and nothing else."""
 
+import time
+
 import numpy as np
 import pytest
 from bolfi_liquids.hardware.motion import star
 from bolfi_liquids.inference import Bolfi
-from bolfi_liquids.inference.simulations import Simulation
+from bolfi_liquids.inference.simulations import Simulation, columns
 from bolfi_liquids.inference.simulations.failures import raised
 
 import bolfi_liquids as bl
@@ -13,19 +15,17 @@ from bolfi_liquids.calibration.summary import BAD_FIT_RATIO
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.online.estimate import (
-    Made,
     OnlineEstimate,
     Problem,
+    answer,
     design,
-    enough,
     estimate,
     fit_to_noise,
     proposals,
-    with_results,
 )
 from bolfi_liquids.online.plan import (
-    SoFar,
-    follow,
+    PartialRecording,
+    align,
     planned,
     stroke_ends,
 )
@@ -59,10 +59,10 @@ class NoMap:
         return Judged(1.0, 0.02, np.array([[spilled, 1.0 - spilled, 0.0]]))
 
 
-def signals(theta, seeds, time=PLAN.time):
+def signals(theta, seeds, times=PLAN.time):
     """The more viscous, the wider the stick swings, in (B, T, 2); NOISE between seeds."""
     size = 0.05 + 0.02 * np.log10(theta["viscosity"] / 3e-3)
-    wave = np.stack([np.sin(time), np.cos(time)], axis=1)
+    wave = np.stack([np.sin(times), np.cos(times)], axis=1)
     noise = [np.random.default_rng(seed).normal(0.0, NOISE, wave.shape) for seed in seeds]
     return size[:, None, None] * wave + noise
 
@@ -72,17 +72,20 @@ def problem(surrogate="discrepancy", **settings):
     return Problem(default_prior(), stirring, OnlineSettings(surrogate=surrogate, **settings))
 
 
-def made(of, time=PLAN.time):
+def made(of, times=PLAN.time):
     jobs = design(of)
-    theta = {name: np.array([job.theta[name] for job in jobs]) for name in of.prior.names}
-    seeds = np.array([job.seed for job in jobs])
-    return Made(theta, signals(theta, seeds, time), seeds)
+    made_of = signals(*columns(jobs), times)
+    return tuple((job, Simulation(one, None, 0.1)) for job, one in zip(jobs, made_of, strict=True))
 
 
-def followed(strokes, seed=1234):
+def data(strokes, seed=1234):
     until = PLAN.time <= ENDS[strokes - 1]
     seen = signals(TRUTH, [seed])[0]
-    return follow(PLAN, ENDS, SoFar(PLAN.time[until], PATH.position[until], seen[until], 0.0))
+    return PartialRecording(PLAN.time[until], PATH.position[until], seen[until], 0.0)
+
+
+def aligned(strokes, seed=1234):
+    return align(PLAN, ENDS, data(strokes, seed))
 
 
 def width(found):
@@ -97,7 +100,7 @@ def test_more_strokes_say_more(surrogate):
     of = problem(surrogate)
     known = made(of)
     first, last = (
-        [estimate(of, known, followed(k, seed), NoMap(), 0.0) for seed in range(6)]
+        [estimate(of, known, aligned(k, seed), NoMap(), 0.0) for seed in range(6)]
         for k in (1, len(ENDS))
     )
     assert np.mean([width(one) for one in last]) < 0.8 * np.mean([width(one) for one in first])
@@ -110,7 +113,7 @@ def test_more_strokes_say_more(surrogate):
 def test_missing_samples_equal_a_shorter_recording():
     """What is NaN after a stroke teaches what a recording up to there would have taught."""
     of = problem()
-    known, seen = made(of), followed(4)
+    known, seen = made(of), aligned(4)
     samples = int(np.isfinite(seen.observed).all(axis=1).sum())
     short = planned(PLAN.time[:samples], PATH.position[:samples], ATTRS)
     stirring = stir_simulator([short], 200)
@@ -120,14 +123,15 @@ def test_missing_samples_equal_a_shorter_recording():
         discrepancy=stirring.discrepancy(),
         threshold="min_mean",
     )
-    engine.tell(known.theta, known.signals[:, :samples], known.seeds)
+    theta, seeds = columns([job for job, _ in known])
+    engine.tell(theta, np.stack([one.signal[:samples] for _, one in known]), seeds)
     fit = engine.fit()
     again = fit.sample("quadrature", chains=2, draws=500, seed=0)["posterior"]
     asked = NoMap()
     estimate(of, known, seen, asked, 0.0)
     np.testing.assert_array_equal(again["viscosity"].to_numpy().ravel(), asked.liquids["viscosity"])
     # the paper's integral, by another rule than the engine's own
-    square = np.square(seen.observed[:samples] - known.signals[0, :samples]).sum(axis=1)
+    square = np.square(seen.observed[:samples] - known[0][1].signal[:samples]).sum(axis=1)
     assert fit.history.discrepancy[0] == pytest.approx(np.trapezoid(square, short.time))
 
 
@@ -144,26 +148,49 @@ def test_design_is_the_same_again_and_all_over_the_prior():
 
 def test_proposals_are_new_points_with_new_seeds():
     of = problem()
-    known, seen = made(of), followed(6).observed
-    first = proposals(of, known, seen, 16, 2)
-    second = proposals(of, known, seen, 18, 2)
-    assert first == proposals(of, known, seen, 16, 2)
+    known, seen = made(of), aligned(6).observed
+    first = proposals(of, known, seen, 2)
+    failed = Simulation(None, raised(OSError("it raised")), 0.1)
+    second = proposals(of, known + tuple((job, failed) for job in first), seen, 2)
+    assert first == proposals(of, known, seen, 2)
     jobs = first + second
-    assert len({job.seed for job in jobs} | set(known.seeds.tolist())) == 4 + 16
+    assert len({job.seed for job in [*jobs, *(job for job, _ in known)]}) == 4 + 16
     assert len({job.theta["viscosity"] for job in jobs}) == 4
 
 
-def test_failed_simulations_are_kept_as_such_and_teach_nothing():
+def test_failed_simulations_do_not_count_among_those_learned_from():
     of = problem()
     known = made(of)
-    jobs = proposals(of, known, followed(6).observed, 16, 2)
+    one, other = proposals(of, known, aligned(6).observed, 2)
     failed = Simulation(None, raised(OSError("it raised")), 0.1)
     good = Simulation(signals(TRUTH, [7])[0], None, 0.1)
-    more = with_results(known, jobs, [failed, good])
-    assert more.size == 18
-    assert np.isnan(more.signals[16]).all()
-    assert more.theta["viscosity"][16] == jobs[0].theta["viscosity"]
-    assert estimate(of, more, followed(6), NoMap(), 0.0).simulations == 17
+    found = estimate(of, (*known, (one, failed), (other, good)), aligned(6), NoMap(), 0.0)
+    assert found.simulations == 17
+
+
+def test_data_are_answered_once_a_stroke_or_refused():
+    of = problem()
+    known = made(of)
+    first = answer(of, known, NoMap(), 0, data(2))
+    assert (first.aligned.strokes, first.estimate.strokes, first.refusal) == (2, 2, "")
+    assert answer(of, known, NoMap(), 2, data(2)) == (None, None, "")
+    away = data(3)._replace(position=data(3).position + 0.01)
+    refused = answer(of, known, NoMap(), 2, away)
+    assert refused.aligned is refused.estimate is None and "off its plan" in refused.refusal
+    # the data are kept, for simulations that may succeed
+    few = answer(of, known[:2], NoMap(), 0, data(2))
+    assert few.aligned.strokes == 2 and few.estimate is None and few.refusal
+
+
+def test_an_estimate_is_as_late_as_its_stroke_ended_before_it():
+    """Data that go on after the stroke tell when it ended."""
+    of = problem()
+    now = time.monotonic()
+    later = data(3)._replace(ended=now)
+    seen = later.time <= ENDS[1] + 0.5
+    cut = PartialRecording(*(column[seen] for column in later[:3]), ended=now)
+    found = answer(of, made(of), NoMap(), 0, cut)
+    assert found.estimate.lag == pytest.approx(time.monotonic() - now + 0.5, abs=0.5)
 
 
 @pytest.mark.parametrize(
@@ -173,20 +200,20 @@ def test_failed_simulations_are_kept_as_such_and_teach_nothing():
 )
 def test_it_is_enough_when_what_was_asked_for_is_under_the_target(stop, target, strokes, ends):
     found = OnlineEstimate(strokes, 1.0, {}, {}, 0.01, 0.03, 16, 0.1, 0.0, 0.0, ())
-    assert enough(found, OnlineSettings(stop=stop, target=target)) is ends
+    assert found.is_enough(OnlineSettings(stop=stop, target=target)) is ends
 
 
 def test_an_estimate_that_fits_nothing_says_so_and_ends_nothing():
     of = problem()
-    known, good = made(of), followed(len(ENDS))
+    known, good = made(of), aligned(len(ENDS))
     found = estimate(of, known, good, NoMap(), 0.0)
     assert found.fits and 0.5 < found.fit_to_noise < BAD_FIT_RATIO
     settings = OnlineSettings(target=0.99)
-    assert enough(found, settings)
+    assert found.is_enough(settings)
     wrong = good._replace(observed=good.observed + 0.2)  # the zero of a camera is elsewhere
     lost = estimate(of, known, wrong, NoMap(), 0.0)
     assert lost.fit_to_noise > BAD_FIT_RATIO and not lost.fits
-    assert not enough(lost, settings)
+    assert not lost.is_enough(settings)
     assert BAD_FIT in sentence(lost) and BAD_FIT not in sentence(found)
 
 
@@ -216,9 +243,9 @@ def test_an_online_estimate_names_a_wrong_frame():
     ends = stroke_ends(plan)
     for sign, faults in ((1.0, 0), (-1.0, 1)):
         seen = recording.inclination * [1.0, sign]
-        data = SoFar(recording.time, recording.gripper.position, seen, 0.0)
+        whole = PartialRecording(recording.time, recording.gripper.position, seen, 0.0)
         known = made(of, recording.time)
-        found = estimate(of, known, follow(plan, ends, data), NoMap(), 0.0)
+        found = estimate(of, known, align(plan, ends, whole), NoMap(), 0.0)
         assert len(found.frame_faults) == faults
         assert not (faults and found.fits)
 

@@ -7,8 +7,8 @@ from bolfi_liquids.hardware.motion import star
 from bolfi_liquids.online.plan import (
     MAX_DELAY_CHANGE,
     MAX_OFF_PLAN,
-    SoFar,
-    follow,
+    PartialRecording,
+    align,
     planned,
     stroke_ends,
 )
@@ -28,7 +28,7 @@ def data(until, *, delay=0.0, off=0.0, rate=125.0):
     """An arm that does what the plan said `delay` before, `off` metres higher; seen at `rate`."""
     time = np.arange(0.0, until, 1.0 / rate)
     position = np.column_stack([np.interp(time - delay, PLAN.time, x) for x in PATH.position.T])
-    return SoFar(time, position + [0.0, 0.0, off], inclination(time - delay), 0.0)
+    return PartialRecording(time, position + [0.0, 0.0, off], inclination(time - delay), 0.0)
 
 
 def test_strokes_of_a_star_end_where_it_turns():
@@ -41,15 +41,15 @@ def test_strokes_of_a_star_end_where_it_turns():
 
 @pytest.mark.parametrize("delay", [0.0, 0.032, -0.02])
 def test_data_are_those_of_the_plan_up_to_the_last_finished_stroke(delay):
-    followed = follow(PLAN, ENDS, data(ENDS[3] + 0.2, delay=delay))
-    assert (followed.strokes, followed.covered, followed.refusal) == (4, ENDS[3], "")
-    assert followed.delay == pytest.approx(delay, abs=1e-3)
-    assert followed.apart < 2e-4
+    aligned = align(PLAN, ENDS, data(ENDS[3] + 0.2, delay=delay))
+    assert (aligned.strokes, aligned.covered, aligned.refusal) == (4, ENDS[3], "")
+    assert aligned.delay == pytest.approx(delay, abs=1e-3)
+    assert aligned.apart < 2e-4
     truth = inclination(PLAN.time)
     inside = (PLAN.time <= ENDS[3]) & (PLAN.time > 0.05)
     # half a millisecond of delay, and what lies between samples
-    np.testing.assert_allclose(followed.observed[inside], truth[inside], atol=3e-4)
-    assert np.isnan(followed.observed[PLAN.time > ENDS[3] + 1e-3]).all()
+    np.testing.assert_allclose(aligned.observed[inside], truth[inside], atol=3e-4)
+    assert np.isnan(aligned.observed[PLAN.time > ENDS[3] + 1e-3]).all()
 
 
 def test_an_arm_that_gets_later_and_later_is_followed():
@@ -59,12 +59,12 @@ def test_an_arm_that_gets_later_and_later_is_followed():
     seen = data(ENDS[8] + late * ENDS[8] + 0.2)
     time = seen.time / (1.0 + late)
     position = np.column_stack([np.interp(time, PLAN.time, x) for x in PATH.position.T])
-    followed = follow(PLAN, ENDS, SoFar(seen.time, position, inclination(time), 0.0))
-    assert (followed.strokes, followed.refusal) == (9, "")
-    assert followed.delay == pytest.approx(late * ENDS[8], abs=0.02)
+    aligned = align(PLAN, ENDS, PartialRecording(seen.time, position, inclination(time), 0.0))
+    assert (aligned.strokes, aligned.refusal) == (9, "")
+    assert aligned.delay == pytest.approx(late * ENDS[8], abs=0.02)
     inside = (PLAN.time <= ENDS[8]) & (PLAN.time > 0.05)
     # within a stroke the delay changes by some 25 ms, and the signal by 0.3 rad/s
-    apart = followed.observed[inside] - inclination(PLAN.time)[inside]
+    apart = aligned.observed[inside] - inclination(PLAN.time)[inside]
     assert np.abs(apart).max() < 0.3 * 0.025
 
 
@@ -75,7 +75,7 @@ def test_a_pause_at_a_corner_is_followed_from_its_first_sample_on(until):
     seen = data(until)
     time = seen.time - np.clip(seen.time - corner, 0.0, 0.05)
     position = np.column_stack([np.interp(time, PLAN.time, x) for x in PATH.position.T])
-    assert follow(PLAN, ENDS, seen._replace(position=position)).refusal == ""
+    assert align(PLAN, ENDS, seen._replace(position=position)).refusal == ""
 
 
 def test_no_sample_falls_between_two_strokes():
@@ -83,29 +83,29 @@ def test_no_sample_falls_between_two_strokes():
     seen = data(ENDS[2], delay=delay)
     away = (seen.time > ENDS[0]) & (seen.time < ENDS[0] + delay)
     seen.position[away, 2] += 2.0 * MAX_OFF_PLAN
-    assert "mm off its plan" in follow(PLAN, ENDS, seen).refusal
+    assert "mm off its plan" in align(PLAN, ENDS, seen).refusal
 
 
 def test_a_recording_of_the_plan_itself_is_left_as_it_is():
-    same = SoFar(PLAN.time, PATH.position, inclination(PLAN.time), 0.0)
-    followed = follow(PLAN, ENDS, same)
+    same = PartialRecording(PLAN.time, PATH.position, inclination(PLAN.time), 0.0)
+    aligned = align(PLAN, ENDS, same)
     until = PLAN.time <= ENDS[-1]
-    np.testing.assert_array_equal(followed.observed[until], inclination(PLAN.time)[until])
-    assert followed.delay == 0.0
+    np.testing.assert_array_equal(aligned.observed[until], inclination(PLAN.time)[until])
+    assert aligned.delay == 0.0
 
 
 def test_before_the_first_stroke_ends_there_is_nothing():
-    followed = follow(PLAN, ENDS, data(ENDS[0] - 0.1))
-    assert followed.strokes == 0
-    assert np.isnan(followed.observed).all()
+    aligned = align(PLAN, ENDS, data(ENDS[0] - 0.1))
+    assert aligned.strokes == 0
+    assert np.isnan(aligned.observed).all()
 
 
 def test_what_the_cameras_missed_is_missing():
     seen = data(ENDS[5] + 0.1)
     blind = (seen.time > 1.0) & (seen.time < 1.5)
     seen.inclination[blind, 1] = np.nan
-    followed = follow(PLAN, ENDS, seen)
-    missing = np.isnan(followed.observed) & (PLAN.time <= ENDS[5])[:, None]
+    aligned = align(PLAN, ENDS, seen)
+    missing = np.isnan(aligned.observed) & (PLAN.time <= ENDS[5])[:, None]
     missing[0] = False
     assert not missing[:, 0].any()
     wanted = (PLAN.time > 1.0) & (PLAN.time < 1.48)
@@ -122,12 +122,12 @@ def test_what_the_cameras_missed_is_missing():
     ],
 )
 def test_another_stir_is_refused(fault, says):
-    assert says in follow(PLAN, ENDS, data(ENDS[2] + 0.1, **fault)).refusal
+    assert says in align(PLAN, ENDS, data(ENDS[2] + 0.1, **fault)).refusal
 
 
 @pytest.mark.parametrize("fault", [{"off": 0.7 * MAX_OFF_PLAN}, {"delay": 0.8 * MAX_DELAY_CHANGE}])
 def test_tracking_errors_are_not(fault):
-    assert follow(PLAN, ENDS, data(ENDS[2] + 0.1, **fault)).refusal == ""
+    assert align(PLAN, ENDS, data(ENDS[2] + 0.1, **fault)).refusal == ""
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def test_tracking_errors_are_not(fault):
 )
 def test_arrays_that_are_no_recording_are_named(wrong):
     with pytest.raises(ValueError, match="data so far"):
-        follow(PLAN, ENDS, data(2.0)._replace(**wrong))
+        align(PLAN, ENDS, data(2.0)._replace(**wrong))
 
 
 def test_a_plan_needs_a_density_and_a_path():

@@ -7,6 +7,7 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from multiprocessing import active_children
 
 import pytest
 from distributed import LocalCluster
@@ -15,7 +16,7 @@ import bolfi_liquids as bl
 from bolfi_liquids.cli.compute import open_executor_of
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.run.compute import open_compute
-from bolfi_liquids.run.workers import processes
+from bolfi_liquids.run.workers import background_process, processes
 
 WORKING = """
 import os, signal, time
@@ -30,6 +31,16 @@ with processes(2) as pool:
     time.sleep(300)
 """
 """One of its workers is busy then, the other idle."""
+
+IN_BACKGROUND = """
+import os, signal, time
+from bolfi_liquids.run.workers import background_process
+
+with background_process(0) as pool:
+    pool.submit(os.getpid).result()
+    pool.submit(time.sleep, 300)
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
 
 
 @pytest.fixture
@@ -72,6 +83,32 @@ def test_workers_go_on_where_ctrl_c_is_ignored():
             assert pool.submit(pow, 2, 3).result(60.0) == 8
     finally:
         signal.signal(signal.SIGINT, told)
+
+
+def test_a_process_in_the_background_ends_with_a_parent_that_is_killed():
+    # `run` returns when nobody holds the pipe
+    killed = subprocess.run(
+        [sys.executable, "-c", IN_BACKGROUND], stdout=subprocess.PIPE, timeout=200
+    )
+    assert killed.returncode == -signal.SIGKILL
+
+
+def test_a_process_in_the_background_gives_way_and_leaves_ctrl_c_to_its_parent():
+    with background_process(3) as pool:
+        pid = pool.submit(os.getpid).result()
+        here = os.getpriority(os.PRIO_PROCESS, 0)
+        assert os.getpriority(os.PRIO_PROCESS, pid) == min(here + 3, 19)
+        os.kill(pid, signal.SIGINT)
+        assert pool.submit(os.getpid).result() == pid
+
+
+def test_work_in_the_background_is_given_up():
+    began = time.monotonic()
+    with background_process(0) as pool:
+        pid = pool.submit(os.getpid).result()
+        pool.submit(time.sleep, 300)
+    assert time.monotonic() - began < 200
+    assert pid not in {child.pid for child in active_children()}
 
 
 def test_work_is_waited_for_where_there_was_no_error():
