@@ -55,17 +55,19 @@ def receiver_glass(cups: "Cups", distance: float) -> Glass:
     return Glass(cups.receiver.radius, cups.receiver.height, floor, UP)
 
 
-def pour_view(cups: "Cups", distance: float) -> OrthographicView:
-    """A camera that sees the source at any angle, the receiver and the table around it."""
+def pour_view(cups: "Cups", distance: float, share: float = 1.0) -> OrthographicView:
+    """A camera that sees the source at any angle, the receiver and the table around it; `share` of
+    `PICTURE_SIZE` wide."""
+    width, height = (round(share * pixels) for pixels in PICTURE_SIZE)
     source, receiver = cups.source, cups.receiver
     high = np.hypot(2.0 * source.radius, source.height)
     low = -cups.pour.lip_height - receiver.radius * np.sin(ELEVATION)
     low -= CAPTION_HEIGHT * (high - low)
     left = -max(2.0 * source.radius, receiver.radius - distance)
     right = max(distance + receiver.radius, source.height)
-    scale = min(PICTURE_SIZE[1] / (high - low), PICTURE_SIZE[0] / (right - left)) / 1.12
+    scale = min(height / (high - low), width / (right - left)) / 1.12
     centre = float(left + right) / 2.0, 0.0, float(high + low) / 2.0
-    return OrthographicView(*PICTURE_SIZE, float(scale), centre, AZIMUTH, ELEVATION)
+    return OrthographicView(width, height, float(scale), centre, AZIMUTH, ELEVATION)
 
 
 def pour_pictures(
@@ -74,6 +76,7 @@ def pour_pictures(
     cups: "Cups",
     distance: float,
     caption: Sequence[str],
+    share: float = 1.0,
 ) -> Iterator[NDArray[np.uint8]]:
     """A picture of each frame, of shape [height, width, 3].
 
@@ -83,8 +86,9 @@ def pour_pictures(
         cups: That they were made with.
         distance: From the lip to the receiver's axis [m].
         caption: Lines for a corner, beside time and fractions.
+        share: Of `PICTURE_SIZE`.
     """
-    view, count = pour_view(cups, distance), frames.position.shape[1]
+    view, count = pour_view(cups, distance, share), frames.position.shape[1]
     spacing, receiver = cups.spacing(count), receiver_glass(cups, distance)
     empty = room(view, [receiver])
     passed = np.isnan(frames.position).any(axis=-1).sum(axis=1)

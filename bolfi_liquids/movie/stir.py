@@ -25,15 +25,17 @@ PICTURE_SIZE = 640, 480
 AZIMUTH, ELEVATION = np.radians(25.0), np.radians(22.0)
 
 
-def stir_view(setup: "StirSetup") -> OrthographicView:
-    """A camera that sees the cup, and the stick's lower half."""
+def stir_view(setup: "StirSetup", share: float = 1.0) -> OrthographicView:
+    """A camera that sees the cup, and the stick's lower half; `share` of `PICTURE_SIZE` wide."""
+    width, height = (round(share * pixels) for pixels in PICTURE_SIZE)
     tall = setup.cup.height + 0.9 * setup.cup.radius
-    scale = PICTURE_SIZE[1] / (1.3 * tall + 2.0 * setup.cup.radius * np.sin(ELEVATION))
-    return OrthographicView(*PICTURE_SIZE, float(scale), (0.0, 0.0, tall / 2.0), AZIMUTH, ELEVATION)
+    scale = height / (1.3 * tall + 2.0 * setup.cup.radius * np.sin(ELEVATION))
+    centre = 0.0, 0.0, tall / 2.0
+    return OrthographicView(width, height, float(scale), centre, AZIMUTH, ELEVATION)
 
 
 def stir_pictures(
-    frames: "StirFrames", setup: "StirSetup", caption: Sequence[str]
+    frames: "StirFrames", setup: "StirSetup", caption: Sequence[str], share: float = 1.0
 ) -> Iterator[NDArray[np.uint8]]:
     """A picture of each frame, of shape [height, width, 3].
 
@@ -41,8 +43,9 @@ def stir_pictures(
         frames: Of `models.stir_frames`.
         setup: That they were made with.
         caption: Lines for a corner, beside the time.
+        share: Of `PICTURE_SIZE`.
     """
-    view, cup = stir_view(setup), setup.cup
+    view, cup = stir_view(setup, share), setup.cup
     glass = Glass(cup.radius, cup.height, np.zeros(3), np.array([0.0, 0.0, 1.0]))
     empty = drawn(view, room(view, [glass]), glass_behind(glass, view))
     before = glass_before(glass, view)

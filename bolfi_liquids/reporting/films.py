@@ -39,6 +39,9 @@ MAX_STIR_SECONDS = 6.0
 FILM_RATE = 8.0
 """Pictures per second."""
 
+FILM_SHARE = 0.6
+"""Of the size of a movie's pictures: three stand side by side."""
+
 
 class Draw(NamedTuple):
     """A liquid of the posterior with its effects, and the seed with which it is shown."""
@@ -81,7 +84,7 @@ class StirScene(NamedTuple):
             frames = simulator.frames(draw.theta, draw.seed, FILM_RATE)
         if not np.isfinite(frames.tip).all():
             return b""
-        return encoded(stir_pictures(frames, setup, [str(draw)]), FILM_RATE)
+        return encoded(stir_pictures(frames, setup, (), FILM_SHARE), FILM_RATE)
 
 
 class PourScene(NamedTuple):
@@ -119,7 +122,7 @@ class PourScene(NamedTuple):
         result = frames.landed.into(self.distance, cups.receiver.radius)
         if not np.isfinite(result.spilled).all():
             return b""
-        pictures = pour_pictures(frames, frames.landed, cups, self.distance, [str(draw)])
+        pictures = pour_pictures(frames, frames.landed, cups, self.distance, (), FILM_SHARE)
         return encoded(pictures, FILM_RATE)
 
 
@@ -194,7 +197,12 @@ def _digest(scene: StirScene | PourScene, draw: Draw) -> str:
     """Of all that a film shows."""
     from ..models import MODEL_VERSION
 
-    common = {"model": MODEL_VERSION, "rate": FILM_RATE, "seconds": MAX_STIR_SECONDS}
+    common = {
+        "model": MODEL_VERSION,
+        "rate": FILM_RATE,
+        "share": FILM_SHARE,
+        "seconds": MAX_STIR_SECONDS,
+    }
     shown = as_json({**common, **scene.content, **draw._asdict()})
     return sha256(shown.encode()).hexdigest()[:12]
 
