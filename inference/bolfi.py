@@ -233,16 +233,13 @@ class Bolfi:
         history = self._state.history
         return history.distinct & ~is_outlier(history.discrepancy)
 
-    def _runs(self) -> RunOutcomes:
-        """Where runs succeeded; those that blew up did not."""
-        history = self._state.history
-        return RunOutcomes(history.u, history.succeeded & ~is_outlier(history.discrepancy))
-
     def _training_data(self) -> TrainingData:
         history = self._state.history
         good = self._training_mask
         known = history.u[good], history.features[good], history.discrepancy[good]
-        return TrainingData(*known, self.prior.normal, self._runs())
+        # runs that blew up did not succeed
+        succeeded = history.succeeded & ~is_outlier(history.discrepancy)
+        return TrainingData(*known, self.prior.normal, RunOutcomes(history.u, succeeded))
 
     def tell(
         self,

@@ -32,6 +32,7 @@ def plot_search(rounds: np.ndarray, discrepancy: np.ndarray, ax: "Axes | None") 
         discrepancy: [n], NaN where a simulation failed.
         ax: To draw on; None makes a figure.
     """
+    check_axes(ax, "ax")
     if ax is None:
         ax = plt.subplots(figsize=(5.2, 3.4), layout="constrained")[1]
     at = np.maximum(rounds + 1, 0)  # 0: before the first round

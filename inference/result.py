@@ -348,9 +348,7 @@ class Fit:
         Raises:
             ValueError: `ax` is no axes of Matplotlib.
         """
-        from .figures import check_axes, plot_search
-
-        check_axes(ax, "ax")
+        from .figures import plot_search
 
         return plot_search(self.history.rounds, self.history.discrepancy, ax)
 
