@@ -17,6 +17,7 @@ from scipy.ndimage import affine_transform, gaussian_filter, map_coordinates
 from .view import OrthographicView
 
 CELLS_PER_SPACING = 2.5  # grid cells a particle spacing
+MIN_CELL_PIXELS = 2.0  # of a grid cell: a small picture needs no finer one
 SMEAR_SD = 0.9  # sd of a smeared particle, by the spacing: particles on a grid lie unevenly
 SURFACE_LEVEL = 0.5  # of the rest density: here is the surface, where it is flat
 DROP_RADIUS = (3.0 / (4.0 * np.pi)) ** (1.0 / 3.0)  # of a particle's volume, by the spacing
@@ -73,8 +74,9 @@ class _Grid(NamedTuple):
     shape: tuple[int, int, int]
 
     @classmethod
-    def around(cls, points: NDArray, spacing: float) -> "_Grid":
-        cell, reach = spacing / CELLS_PER_SPACING, 3.0 * SMEAR_SD * spacing
+    def around(cls, points: NDArray, spacing: float, pixel: float) -> "_Grid":
+        cell = max(spacing / CELLS_PER_SPACING, MIN_CELL_PIXELS * pixel)
+        reach = 3.0 * SMEAR_SD * spacing
         # at multiples of the cell, so that liquid at rest does not shimmer
         low = np.floor((points.min(axis=0) - reach) / cell)
         high = np.ceil((points.max(axis=0) + reach) / cell)
@@ -117,7 +119,7 @@ def surface(
     if not len(points):
         return None
     seen = view.camera(points) * (1.0, 1.0, -1.0)  # away from the camera
-    grid = _Grid.around(seen, spacing)
+    grid = _Grid.around(seen, spacing, 1.0 / view.scale)
     density = _density(view, points, seen, grid, (spacing, glass))
     return _looked_at(view, grid, density)
 
