@@ -1,9 +1,9 @@
 """The command line; each command calls the function of the same name."""
 
 import signal
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -175,10 +175,10 @@ def pour(
     With --execute nothing is chosen anew: it is a dry run of the chosen pour, unless armed.
     """
     if execution.execute:
-        if options != PourOptions() or settings != PourSettings():
+        if typed := [*_changed(options), *_changed(settings)]:
             raise typer.BadParameter(
-                "--execute carries out the pour that RUN has chosen already; the other options "
-                "belong to the choice, which is made without --execute"
+                f"{', '.join(typed)}: of the choice of a pour, which is made without --execute; "
+                "with it the pour is carried out that RUN has chosen already"
             )
         cli_record.execute(run, execution)
         return
@@ -199,6 +199,15 @@ def pour(
     print_pour(chosen)
     print_warnings(Results.of(chosen.run))
     print_next(run, "report")
+
+
+def _changed(group: Any) -> list[str]:
+    """The options of a group that are not the default."""
+    usual = type(group)()
+    names = [
+        one.name for one in fields(group) if getattr(group, one.name) != getattr(usual, one.name)
+    ]
+    return [f"--{name.replace('_', '-')}" for name in names]
 
 
 @app.command(epilog=examples("report runs/mine", "report runs/mine --still"))

@@ -307,4 +307,4 @@ def test_one_kind_of_arm_alone_moves_without_the_sentence(tmp_path):
             hardware.SessionSetup(rig, tmp_path, other, armed=True)
         # nor do its guards bear what only an emulated arm may bear
         setup = hardware.SessionSetup(rig, tmp_path, other)
-        assert not setup.rehearsal and setup.guarded_rig().limits == rig.limits
+        assert not setup.rehearsal and setup.guarded_rig.limits == rig.limits

@@ -24,4 +24,4 @@ class PatientSetup(SessionSetup):
     """A session by the real client, whose guards bear stalls."""
 
     def guarded_rig(self) -> Rig:
-        return patient(super().guarded_rig())
+        return patient(super().guarded_rig)
