@@ -1,5 +1,7 @@
 """Sessions with an emulated controller: a computer that runs it, too, has stalls of its own."""
 
+from functools import cached_property
+
 from bolfi_liquids.hardware.rig import Rig
 from bolfi_liquids.hardware.session.setup import SessionSetup
 
@@ -23,5 +25,6 @@ def patient(rig: Rig) -> Rig:
 class PatientSetup(SessionSetup):
     """A session by the real client, whose guards bear stalls."""
 
+    @cached_property
     def guarded_rig(self) -> Rig:
         return patient(super().guarded_rig)
