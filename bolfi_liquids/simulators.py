@@ -185,7 +185,7 @@ Batched = Callable[[Mapping[str, Any], Any], "PourBatch"]
 
 
 class PourOutcome(Protocol):
-    """Which pours are made of each theta, and what is kept of them; two equal ones compare so."""
+    """Which pours are made of each theta, and what is kept of them; `settings` identify it."""
 
     def __call__(
         self, batch: Batched, theta: Mapping[str, NDArray], seeds: NDArray

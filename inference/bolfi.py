@@ -260,7 +260,8 @@ class Bolfi:
                 a discrepancy or summary of the user's own compares them.
             seeds: Seeds of the runs [n], to be kept with the results. Of runs with equal theta,
                 seed and signal one is learned from.
-            errors: Why a run failed [n], to be kept for rows of NaN; "" or None elsewhere.
+            errors: Why a run failed [n], to be kept for rows of NaN; "" or None elsewhere. A text
+                counts as raised; `Fit.history.why` keeps the kinds.
 
         Raises:
             ValueError: shapes disagree, theta lies outside the prior's support, or the user's

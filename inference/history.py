@@ -62,7 +62,7 @@ class History(NamedTuple):
 
     @property
     def failures(self) -> dict[str, int]:
-        """Failed runs by kind: "raised", "not finite", "timeout", "unusable", "incomparable"."""
+        """Failed runs by `FailureKind`."""
         return count(self.why)
 
 

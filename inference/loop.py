@@ -110,10 +110,11 @@ def fit(  # noqa: PLR0913  the one call that most users make
             as long, and if it fails they are tried one by one. `simulate` then runs in a
             thread, which is abandoned, not stopped, when it is overdue: see `job.within`.
         earlier: Your own simulations (theta, signals), (theta, signals, seeds), as
-            `SimulationBank.simulations` returns them, or (theta, signals, seeds, errors); see
-            `Bolfi.tell`. theta may be a data frame. They are learned from like the others, take the
-            place of the start design's points, and count beside the budget, which may then be 0.
-            Their posterior is confirmed, too, unless `simulate` is None.
+            `SimulationBank.simulations` returns them, or (theta, signals, seeds, errors), as
+            `Fit.history.why` has them; see `Bolfi.tell`. theta may be a data frame. They are
+            learned from like the others, take the place of the start design's points, and count
+            beside the budget, which may then be 0. Their posterior is confirmed, too, unless
+            `simulate` is None.
         vectorised: Whether `simulate` makes a batch of runs in one call; False calls it once
             for each run, such as `simulate({"a": 1.0}, seed)`.
         in_rounds: Whether points are asked a round at a time. False asks the next one as soon as
@@ -323,7 +324,7 @@ def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Si
     theta, seeds = columns(asked)
     if engine.expected_shape is not None:
         results = of_one_shape(results, asked, engine.expected_shape)
-    errors = [result.error or "" for result in results]
+    errors = [result.error for result in results]
     failed = np.full(engine.signal_shape, np.nan)
     signals = [failed if result.signal is None else result.signal for result in results]
     engine.tell(theta, signals, seeds, errors)  # pyright: ignore[reportArgumentType]

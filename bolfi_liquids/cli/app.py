@@ -35,6 +35,7 @@ from .printed import (
     print_next,
     print_next_pour,
     print_pour,
+    print_pour_before,
     print_seconds,
     print_warnings,
 )
@@ -175,7 +176,7 @@ def pour(
     With --execute nothing is chosen anew: it is a dry run of the chosen pour, unless armed.
     """
     if execution.execute:
-        if typed := [*_changed(options), *_changed(settings)]:
+        if typed := [one for group in (options, settings, compute) for one in _changed(group)]:
             raise typer.BadParameter(
                 f"{', '.join(typed)}: of the choice of a pour, which is made without --execute; "
                 "with it the pour is carried out that RUN has chosen already"
@@ -246,7 +247,7 @@ def demo(
     with complaints_among_results(), compute.opened() as opened:
         made = run_demo(out, compute=opened, fitted=print_calibration)
     print_findings(made.criticism)
-    typer.echo(f"pour before criticism: {made.pour_before.chosen}")
+    print_pour_before(made.pour_before)
     print_pour(made.pour)
     print_warnings(Results.of(made.calibration.run))
     print_seconds(made.seconds)

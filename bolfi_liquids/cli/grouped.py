@@ -63,11 +63,16 @@ def _of_fields(group: Any) -> list[inspect.Parameter]:
 
 def _of_settings(group: Any) -> dict[str, Any]:
     """Typer's annotations of settings; their own rules check the values."""
-    return {name: _typed(field) for name, field in group.__pydantic_fields__.items()}
+    return {field.name: _typed(setting(group, field.name)) for field in fields(group)}
+
+
+def setting(settings: Any, name: str) -> FieldInfo:
+    """How a setting is declared."""
+    return settings.__pydantic_fields__[name]
 
 
 def _typed(field: FieldInfo) -> Any:
-    """How one setting is typed: several names are one option that is repeated."""
+    """Typer's annotation of a setting: several names are one option that is repeated."""
     kind: Any = field.annotation
     if kind == tuple[str, ...] | None:
         return Annotated[list[str] | None, typer.Option(help=field.description)]

@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..inputs.settings import CalibrationSettings
+from .grouped import setting
+
 if TYPE_CHECKING:
     from ..inputs.pour_table import PourTable
 
@@ -18,10 +21,7 @@ CupsOption = Annotated[
     typer.Option("--cups", metavar="FILE", help="cups.toml; without it, the bundled one."),
 ]
 ParticlesOption = Annotated[
-    int,
-    typer.Option(
-        "--particles", help="Number of particles; 0: cells follow the stick, or the cup that pours."
-    ),
+    int, typer.Option("--particles", help=setting(CalibrationSettings, "particles").description)
 ]
 LiquidOption = Annotated[
     str | None,

@@ -77,6 +77,15 @@ def print_pour(pour: "Pour") -> None:
     _print_prose(("pour",), {"pour": facts})
 
 
+def print_pour_before(pour: "Pour") -> None:
+    """The pour that would have been chosen without a criticism."""
+    from ..reporting.facts import pour_facts
+
+    facts = pour_facts(pour)
+    expected = f"expected to spill {facts['spilled']}"
+    typer.echo(f"pour before criticism: {facts['turn']}, {facts['distance']}, {expected}")
+
+
 def print_findings(criticism: "Criticism") -> None:
     """The verdict of a criticism, its evidence and what to do next."""
     from ..reporting.facts import criticism_facts

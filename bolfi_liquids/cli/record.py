@@ -136,7 +136,7 @@ def record(
         print_calibration(calibration)
         print_warnings(Results.of(calibration.run))
     if recording.attrs["status"] == "aborted":
-        reason = recording.attrs.get("reason") or "no reason is told"
+        reason = recording.attrs.get("reason") or "no reason given"
         raise Aborted(f"{recording.path}: the recording was aborted: {reason}")
     calibrated = None if choice is None else choice.run
     typer.echo("next: " + " or: ".join(next_commands(recording.path, calibrated)))

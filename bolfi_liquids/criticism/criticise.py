@@ -126,8 +126,14 @@ def _find(
         report=report,
     )
     cameras = camera_noise(inputs.stirring.recordings)
-    # executor, timeout, batch and bank, as the engine takes them
-    how = vars(compute) | {"seed": inputs.settings.seed, "level": inputs.level}
+    how: dict[str, Any] = {
+        "executor": compute.executor,
+        "timeout": compute.timeout,
+        "batch": compute.batch,
+        "bank": compute.bank,
+        "seed": inputs.settings.seed,
+        "level": inputs.level,
+    }
     stirs = _stirs(calibration, inputs, cameras, clean, how | {"report": report})
     how["report"] = lambda phase, n: report(f"pours, {phase}", n)
     poured = inputs.table and _pours(calibration, stirs, inputs.table, inputs, how)

@@ -69,7 +69,8 @@ class Inputs:
         made_from = {
             "after": self.after,
             "version": version("bolfi-liquids"),
-            "settings": asdict(self.settings),
+            # how many are simulated together changes no result
+            "settings": {k: v for k, v in asdict(self.settings).items() if k != "batch"},
             "considered": [names_of_effects(s, self.settings.effects) for s in ("stir", "pour")],
             **{
                 group: {one.path.name: one.hash for one in files} for group, files in groups.items()

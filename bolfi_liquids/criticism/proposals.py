@@ -1,11 +1,10 @@
 """Proposals of further stirs and pours."""
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..inputs.recording import Recording, Trajectory
+from ..inputs.recording import planned_recording
 from ..inputs.strokes import speed
 from ..simulators import PourSimulator, StirSimulator
 from .pour_noise import PourNoise
@@ -23,18 +22,6 @@ MAX_SPEED = 0.2
 
 MAX_RADIUS_SHARE = 0.8
 """Of the way from the axis to the wall that the stick may go."""
-
-
-@dataclass(frozen=True, eq=False)
-class Planned:
-    """A stir that was not made: what a simulator needs of a recording."""
-
-    gripper: Trajectory
-    recording: Recording
-
-    def number(self, name: str) -> float:
-        """A numeric attribute of the recording whose rig it repeats."""
-        return self.recording.number(name)
 
 
 def stir_proposals(
@@ -69,8 +56,8 @@ def stir_proposals(
     }
     made = []
     for label, path in paths.items():
-        planned = Planned(Trajectory(path.time, path.position), recording)
-        own = StirSimulator((planned,), (setup,))  # type: ignore[arg-type]
+        plan = planned_recording(path.time, path.position, recording.attrs)
+        own = StirSimulator((plan,), (setup,))
         shape = (len(path.time), 2)
         made.append(Proposal(own.simulate, all_noise, shape, own.identity, label))
     return made

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from ..wording import html_table
-from .fields import AXES, LENGTHS, PLANES, UNITS
+from .fields import AXES, DENSITIES, LENGTHS, PLANES, UNITS
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
     from xarray import Dataset
 
 
@@ -130,7 +132,7 @@ def recording_warnings(recordings: Iterable[Recording]) -> list[str]:
         if one.attrs.get("status") == "aborted":
             warnings.append(
                 f"{one.path}: aborted after {one.time[-1] - one.time[0]:.1f} s of stirring "
-                f"({one.attrs.get('reason') or 'no reason is told'}); a short stir says little"
+                f"({one.attrs.get('reason') or 'no reason given'}); a short stir says little"
             )
         warnings += [f"{one.path}: {text}" for text in one.torn]
     return warnings
@@ -147,6 +149,36 @@ def recording_dataset(values: Mapping[str, NDArray], attrs: Mapping[str, float |
 
     samples = {name: ("time", values[name], {"units": units[0]}) for name, units in UNITS.items()}
     return Dataset(samples, attrs=attrs).set_coords("time")
+
+
+def planned_recording(
+    time: "ArrayLike", position: "ArrayLike", attrs: Mapping[str, float | str]
+) -> Recording:
+    """A stir that was not made yet, as a recording that has seen nothing.
+
+    Args:
+        time: Of the path [s], shape (T,), increasing. What is simulated is sampled at these
+            times, so let them be about as far apart as the cameras' frames.
+        position: Of the gripper [m], shape (T, 3).
+        attrs: As a recording's: geometry and densities.
+
+    Raises:
+        InputError: The density of the liquid is missing, or the path is no path.
+    """
+    time, position = np.array(time, np.float64), np.array(position, np.float64)
+    rises = time.ndim == 1 and len(time) > 2 and bool((np.diff(time) > 0).all())
+    if not rises or position.shape != (len(time), 3) or not np.isfinite(position).all():
+        raise InputError(
+            f"times of shape {time.shape} and positions of shape {position.shape}",
+            where="planned path",
+            fix="give (T,) increasing times in s and (T, 3) finite positions in m",
+        )
+    for name in DENSITIES:
+        if name not in attrs:
+            raise InputError("missing", where=f"plan: attribute {name}", fix="weigh the liquid")
+    unseen = np.full((len(time), 2), np.nan)
+    path = Trajectory(time, position)
+    return Recording(time, path, unseen, MappingProxyType(dict(attrs)), Path("plan"), "")
 
 
 def along_path(recording: Recording, inclination: NDArray) -> dict[str, NDArray]:

@@ -111,6 +111,8 @@ def checked(where: str = "") -> Callable[[type[T]], type[T]]:
 
         @wraps(validate)
         def init(self: T, *values: Any, **named: Any) -> None:
+            if len(values) > len(names):
+                raise TypeError(f"{cls.__name__} takes {len(names)} values, got {len(values)}")
             try:
                 validate(self, **dict(zip(names, values, strict=False)), **named)
             except ValidationError as err:
@@ -125,7 +127,7 @@ def checked(where: str = "") -> Callable[[type[T]], type[T]]:
     return decorate
 
 
-def told(text: str, **limits: Any) -> Any:
+def helped(text: str, **limits: Any) -> Any:
     """The help of an option, and limits of its values."""
     return Field(description=text, **limits)
 
@@ -134,14 +136,14 @@ def told(text: str, **limits: Any) -> Any:
 class CalibrationSettings:
     """What decides a calibration besides its recordings and prior."""
 
-    budget: Annotated[Simulations, told("Simulations of the search.")] = 20
-    batch: Annotated[Count, told("Simulations run at the same time.")] = 4
+    budget: Annotated[Simulations, helped("Simulations of the search.")] = 20
+    batch: Annotated[Count, helped("Simulations run at the same time.")] = 4
     seed: Seed = 0
-    surrogate: Annotated[Surrogate, told("What is emulated, see guide priors.")] = "signal"
+    surrogate: Annotated[Surrogate, helped("What is emulated, see guide priors.")] = "signal"
     particles: Particles = 0
-    sampler: Annotated[Sampler, told("Sampler of the posterior.")] = "nuts"
-    chains: Annotated[Integer, told("Chains of the sampler; R-hat needs two.", ge=2, le=1000)] = 4
-    draws: Annotated[Integer, told("Draws kept of each chain.", ge=4, le=MAX_COUNT)] = 1000
+    sampler: Annotated[Sampler, helped("Sampler of the posterior.")] = "nuts"
+    chains: Annotated[Integer, helped("Chains of the sampler; R-hat needs two.", ge=2, le=1000)] = 4
+    draws: Annotated[Integer, helped("Draws kept of each chain.", ge=4, le=MAX_COUNT)] = 1000
 
 
 @checked()
@@ -149,16 +151,16 @@ class SbcSettings:
     """What decides a check of calibrations besides the recording that gives path and rig."""
 
     runs: Annotated[
-        Integer, told("Replicates of the emulator of the inclination.", ge=0, le=MAX_COUNT)
+        Integer, helped("Replicates of the emulator of the inclination.", ge=0, le=MAX_COUNT)
     ] = 200
     sequential: Annotated[
-        Integer, told("Replicates of the paper's surrogate.", ge=0, le=MAX_COUNT)
+        Integer, helped("Replicates of the paper's surrogate.", ge=0, le=MAX_COUNT)
     ] = 40
     design: Annotated[
-        Simulations, told("Points that the emulator's replicates share, each stirred twice.")
+        Simulations, helped("Points that the emulator's replicates share, each stirred twice.")
     ] = 512
-    budget: Annotated[Simulations, told("Simulations of each replicate's search.")] = 20
-    noise_deg: Annotated[float, told("Of the cameras [deg].", gt=0.0, lt=90.0)] = 0.1
+    budget: Annotated[Simulations, helped("Simulations of each replicate's search.")] = 20
+    noise_deg: Annotated[float, helped("Of the cameras [deg].", gt=0.0, lt=90.0)] = 0.1
     particles: Particles = 0
     seed: Seed = 0
 
@@ -187,10 +189,10 @@ class SbcSettings:
 class PourSettings:
     """What decides the choice of a pour besides the posterior and the cups."""
 
-    budget: Annotated[Pours, told("Pours simulated at most, 24 to 100.")] = 64
-    iterations: Annotated[Simulations, told("Angular velocities tried.")] = 31
-    draws: Annotated[Count, told("Posterior draws that each action is tried on.")] = 128
-    risk: Annotated[Risk, told("Spillage to keep low: the mean, or the worst tenth's.")] = "mean"
+    budget: Annotated[Pours, helped("Pours simulated at most, 24 to 100.")] = 64
+    iterations: Annotated[Simulations, helped("Angular velocities tried.")] = 31
+    draws: Annotated[Count, helped("Posterior draws that each action is tried on.")] = 128
+    risk: Annotated[Risk, helped("Spillage to keep low: the mean, or the worst tenth's.")] = "mean"
     seed: Seed = 0
 
 
@@ -198,10 +200,10 @@ class PourSettings:
 class CriticismSettings:
     """What decides a criticism besides its data."""
 
-    effects: Annotated[Names, told("Effects to consider; all if none is given.")] = None
-    accept: Annotated[Names, told("Effects that join the model whatever the verdict.")] = None
+    effects: Annotated[Names, helped("Effects to consider; all if none is given.")] = None
+    accept: Annotated[Names, helped("Effects that join the model whatever the verdict.")] = None
     seed: Seed = 0
-    batch: Annotated[Count, told("Simulations in one call, where there is no executor.")] = 32
+    batch: Annotated[Count, helped("Simulations in one call, where there is no executor.")] = 32
 
     @property
     def stir_plan(self) -> "Plan":

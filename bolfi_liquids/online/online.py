@@ -26,6 +26,7 @@ from ..files import given_path
 from ..inputs.cups import bundled_cups
 from ..inputs.open import Source
 from ..inputs.prior import check_prior, default_prior, describe_prior, read_prior
+from ..inputs.recording import planned_recording
 from ..pouring.design import joint_prior, whole
 from ..pouring.landed_pours import Parcels, pours_in
 from ..pouring.landing_map import LandingMap, learn_map
@@ -35,7 +36,7 @@ from ..run.run import RUN_TOML
 from ..run.workers import background_process
 from ..simulators import PourSimulator, stir_simulator
 from .estimate import Answer, Made, OnlineEstimate, Problem, answer, design, proposals
-from .plan import Aligned, PartialRecording, planned, stroke_ends
+from .plan import Aligned, PartialRecording, stroke_ends
 from .settings import OnlineSettings
 from .simulate import simulate_plan
 
@@ -198,7 +199,7 @@ class OnlineCalibration:
         check_prior(prior)
         prior = read_prior(describe_prior(prior))  # as `finish` writes it down
         cups = bundled_cups() if choice.cups is None else choice.cups
-        plan = planned(path.time, path.position, attrs)
+        plan = planned_recording(path.time, path.position, attrs)
         problem = Problem(prior, stir_simulator([plan], settings.particles), settings)
         out = given_path(choice.run, Argument("run"))
         bank = out / BANK if choice.bank is None else Path(choice.bank)
@@ -220,7 +221,9 @@ class OnlineCalibration:
             # side by side: nothing else is urgent before the robot moves
             batch = max(settings.in_flight, os.cpu_count() or 1)
             simulate = partial(simulate_plan, problem.stirring, bank, batch)
-            return cls(problem, out, learn, simulate, resources.pop_all())
+            made = cls(problem, out, learn, simulate, resources)
+            made._resources = resources.pop_all()  # which it closes from now on
+            return made
 
     @property
     def status(self) -> Status:

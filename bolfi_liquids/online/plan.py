@@ -1,16 +1,12 @@
 """The planned stir, and the data so far as samples along it."""
 
-from collections.abc import Mapping
-from pathlib import Path
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..inputs.fields import DENSITIES
-from ..inputs.recording import Recording, Trajectory
+from ..inputs.recording import Recording
 from ..inputs.strokes import strokes
 
 MAX_OFF_PLAN = 2e-3  # m that the arm may be off its plan; star strokes are 50 mm long
@@ -58,34 +54,6 @@ class Aligned(NamedTuple):
     delay: float
     apart: float
     refusal: str
-
-
-def planned(time: ArrayLike, position: ArrayLike, attrs: Mapping[str, float | str]) -> Recording:
-    """A stir that was not made yet, as a recording that has seen nothing.
-
-    Args:
-        time: Of the path [s], shape (T,), increasing. What is simulated is sampled at these
-            times, so let them be about as far apart as the cameras' frames.
-        position: Of the gripper [m], shape (T, 3).
-        attrs: As a recording's: geometry and densities.
-
-    Raises:
-        InputError: The density of the liquid is missing, or the path is no path.
-    """
-    time, position = np.array(time, np.float64), np.array(position, np.float64)
-    rises = time.ndim == 1 and len(time) > 2 and bool((np.diff(time) > 0).all())
-    if not rises or position.shape != (len(time), 3) or not np.isfinite(position).all():
-        raise InputError(
-            f"times of shape {time.shape} and positions of shape {position.shape}",
-            where="planned path",
-            fix="give (T,) increasing times in s and (T, 3) finite positions in m",
-        )
-    for name in DENSITIES:
-        if name not in attrs:
-            raise InputError("missing", where=f"plan: attribute {name}", fix="weigh the liquid")
-    unseen = np.full((len(time), 2), np.nan)
-    path = Trajectory(time, position)
-    return Recording(time, path, unseen, MappingProxyType(dict(attrs)), Path("plan"), "")
 
 
 def stroke_ends(plan: Recording) -> NDArray[np.float64]:

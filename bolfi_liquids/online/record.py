@@ -152,7 +152,7 @@ class _Stirring:
 
     def _take(self, estimate: "OnlineEstimate | None") -> None:
         status = self._calibration.status
-        if status.phase in (OnlinePhase.FAILED, OnlinePhase.REFUSED):
+        if status.detail and status.phase is not OnlinePhase.PREPARING:
             self._view.warn(f"calibration {status.phase}: {status.detail}")
         if estimate is not None:
             self._enough = estimate.is_enough(self._calibration.settings)

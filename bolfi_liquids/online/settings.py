@@ -6,9 +6,11 @@ from pydantic import Field
 
 from ..errors import InputError
 from ..inputs.settings import (
+    MAX_COUNT,
     MIN_MAP_POURS,
     PRIOR_POURS,
     Count,
+    Integer,
     Particles,
     Seed,
     Simulations,
@@ -42,11 +44,11 @@ class OnlineSettings:
     stop: Literal["bound", "mean"] = "bound"
     least_strokes: Count = 9
     design: Simulations = 16
-    budget: int = 48
+    budget: Simulations = 48
     in_flight: Count = 1
     surrogate: Surrogate = "discrepancy"
     particles: Particles = 0
-    pours: Annotated[int, Field(ge=MIN_MAP_POURS)] = PRIOR_POURS
+    pours: Annotated[Integer, Field(ge=MIN_MAP_POURS, le=MAX_COUNT)] = PRIOR_POURS
     seed: Seed = 0
 
     def __post_init__(self):

@@ -75,7 +75,7 @@ def pours_in(
         raise ValueError("compute needs a bank: the map learns from all pours that it holds")
     compute = replace(compute, batch=AT_ONCE)
     simulate_kept(pours, theta, [job.seed for job in asked], compute, advance=advance)
-    found = [one for one in _in_bank(box, pours, bank)]
+    found = list(_in_bank(box, pours, bank))
     return Poured(
         {name: np.concatenate([one.theta[name] for one in found]) for name in box.prior.names},
         np.concatenate([one.rows for one in found]),

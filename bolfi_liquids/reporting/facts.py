@@ -61,7 +61,7 @@ MAX_LISTED = 3
 MUCH_SPILLED = 0.05
 """Expected spillage that a person would mop up."""
 
-PRIOR_ENDS = {
+ACTION_ENDS = {
     ("angular_velocity", 0): "slowest",
     ("angular_velocity", 1): "fastest",
     ("distance", 0): "nearest",
@@ -415,7 +415,7 @@ def _ends(pour: "DataTree") -> list[str]:
     """The ends of what was allowed at which the chosen pour is; a better one may lie beyond."""
     actions, chosen = pour["actions"], pour["chosen"].attrs
     return [
-        PRIOR_ENDS[name, end]
+        ACTION_ENDS[name, end]
         for name in ACTION
         for end, limit in enumerate(actions[name].to_numpy()[[0, -1]])
         if np.isclose(chosen[name], limit)

@@ -1,7 +1,7 @@
 """Moving pictures of the page: the stirring and the chosen pour, of a few liquids of the posterior.
 
 Each is a film in the folder `moving` of the run, simulated and drawn as by `simulate --movie`. Its
-name ends with a digest of everything that it shows; a film that is there is not made again.
+name ends with a digest of what is simulated for it; a film that is there is not made again.
 """
 
 import json

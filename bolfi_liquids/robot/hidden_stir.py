@@ -1,26 +1,19 @@
 """The stir of a hidden liquid: simulated before the session, replayed by the emulated arm."""
 
 import warnings
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import InputError
 from ..inputs.described_liquid import COHESION
+from ..inputs.recording import planned_recording
+from ..simulators import stir_simulator
 from .stir import StirPlan
 
 if TYPE_CHECKING:
     from ..hardware import HiddenLiquid, Rig
-    from ..hardware.motion import Trajectory
-
-
-class _Expected(NamedTuple):
-    """A stir that was not made yet, as the simulator reads a recording."""
-
-    attrs: Mapping[str, float]
-    gripper: "Trajectory"
 
 
 def with_stir(rig: "Rig", plan: StirPlan, liquid: "HiddenLiquid") -> "HiddenLiquid":
@@ -31,23 +24,25 @@ def with_stir(rig: "Rig", plan: StirPlan, liquid: "HiddenLiquid") -> "HiddenLiqu
     Args:
         rig: What is there.
         plan: That will be followed.
-        liquid: Of which a viscosity is known.
+        liquid: Of which a viscosity is known; one that has a stir keeps it.
 
     Raises:
         InputError: The simulation of the stir goes wrong.
         ValueError: The rig cannot be simulated.
     """
-    from .. import models
     from ..hardware import StickMotion, servoed
     from ..hardware.motion import joined
     from ..hardware.recorder.finalise import rig_attributes
 
+    if liquid.stir is not None:
+        return liquid
     path = servoed(joined(list(plan.strokes)))
-    setup = models.StirSetup.from_recording(_Expected(rig_attributes(rig), path))
-    hidden = models.Liquid(liquid.viscosity, COHESION, rig.liquid.density)
+    expected = planned_recording(path.time, path.position, rig_attributes(rig))
+    simulator = stir_simulator([expected], 0)
+    theta = {"viscosity": np.array([liquid.viscosity]), "cohesion": np.array([COHESION])}
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        (inclination,) = models.stir(hidden, path, setup, [liquid.seed])
+        (inclination,) = simulator.simulate(theta, np.array([liquid.seed]))
     if not np.isfinite(inclination).all():
         why = "; ".join(str(one.message) for one in told)
         raise InputError(

@@ -107,7 +107,7 @@ def finished(directory: Path) -> Recording:
     except InputError as err:
         if recording.attrs.get("status") != "aborted":
             raise
-        reason = recording.attrs.get("reason") or "no reason is told"
+        reason = recording.attrs.get("reason") or "no reason given"
         raise SessionStopped(f"{recording.path}: aborted: {reason}; {err}") from err
     return recording
 

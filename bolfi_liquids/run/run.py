@@ -463,8 +463,6 @@ def _refused(differing: Mapping[str, tuple[Any, Any]], path: Path, growing: str)
 def _unusable(path: Path, err: Exception) -> InputError:
     # the bank's own error names the path and another cure
     cause = err.__cause__ if isinstance(err.__cause__, sqlite3.Error) else err
-    return InputError(
-        f"cannot be used ({cause})",
-        where=str(path),
-        fix="make it writable, restore it from a copy, or start again with another --out",
-    )
+    another = "restore it from a copy, or start again with another --out"
+    fix = f"make it writable, {another}" if isinstance(cause, sqlite3.Error) else another
+    return InputError(f"cannot be used ({cause})", where=str(path), fix=fix)

@@ -42,7 +42,7 @@ def simulate_kept(
     """Signals for each theta and seed; those found in the bank are not simulated again.
 
     Args:
-        simulator: Of stirs or pours; the bank knows its simulations by its identity.
+        simulator: Of stirs or pours; its identity names its simulations in the bank.
         theta: Name -> values, shape (n,).
         seeds: n seeds.
         compute: Where simulations are made and kept.

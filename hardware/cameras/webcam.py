@@ -13,7 +13,7 @@ from .base import CameraError, grey
 V4L2_MANUAL_EXPOSURE = 1.0
 WARM_UP_FRAMES = 5  # the first ones of many webcams are dark or half a picture
 BUFFERS = 3
-MOST_KEPT = 2 * BUFFERS  # pictures; all that a driver has kept, with some to spare
+MAX_KEPT = 2 * BUFFERS  # pictures; all that a driver has kept, with some to spare
 MIN_WAIT = 1e-3  # s; a picture that comes sooner was waiting for an unknown time
 
 
@@ -65,7 +65,7 @@ class Webcam:
             CameraError: the camera stopped to deliver.
         """
         asked, stamp, grabbed = time.monotonic(), self._grab(), 1
-        while stamp - asked < MIN_WAIT and grabbed < MOST_KEPT:
+        while stamp - asked < MIN_WAIT and grabbed < MAX_KEPT:
             asked, stamp, grabbed = stamp, self._grab(), grabbed + 1
         image = self._retrieve()
         return Frame(self._index - 1, stamp, np.ascontiguousarray(grey(image)))

@@ -222,7 +222,7 @@ class EmulatedArm:
     def _end_program(self, rate: float) -> None:
         """Take no further set-point; the joints come to rest at a rate [rad/s2]."""
         self._playing = False
-        self._arm.follow(joint_speed(self._arm.mounted.arm, REST, rate, ends=True))
+        self._arm.follow(joint_speed(REST, rate, ends=True))
 
     def _force(self) -> Six:
         """Noise alone: nothing presses."""

@@ -113,7 +113,7 @@ def oscillator(stiffness: float, damping: float, dt: float) -> tuple[float, floa
     return _CACHE[key]
 
 
-def joint_speed(arm: DhArm, target: np.ndarray, rate: float, *, ends: bool = False) -> Motion:
+def joint_speed(target: np.ndarray, rate: float, *, ends: bool = False) -> Motion:
     """speedJ, and stopJ with target zero: all speeds reach the target together, at `rate`."""
     check_numbers(speed=target, acceleration=rate)
     if rate <= 0.0:

@@ -63,7 +63,7 @@ class SessionSetup:
 
     @property
     def rehearsal(self) -> bool:
-        """Whether the arm is emulated: nobody is asked, and guards bear stalls of this computer."""
+        """Whether the arm is emulated: no confirmation is needed, and guards tolerate stalls."""
         # no other class may say so of itself: this is what spares the confirmation
         return type(self.arm) is EmulatedController
 

@@ -16,9 +16,9 @@ HUBER_SDS = 1.5  # standard deviations
 OUTLIER_SDS = 6.0
 HUBER_ROUNDS = 10
 STEP_TOLERANCE = 1e-6  # s; smaller steps end the search
-LEAST_FRAMES = 30
-LEAST_SPEED = 5.0  # px/s, root mean square: slower, and the pictures tell nothing about time
-LEAST_NOISE = 0.01  # px
+MIN_FRAMES = 30
+MIN_SPEED = 5.0  # px/s, root mean square: slower, and the pictures tell nothing about time
+MIN_NOISE = 0.01  # px
 
 
 class DelayError(ValueError):
@@ -120,13 +120,13 @@ def _seen(series: FrameSeries, path: _Path) -> np.ndarray:
     time = series.stamp
     sampled = (time > path.first + SEARCH_RANGE) & (time < path.last - SEARCH_RANGE)
     seen = sampled & np.isfinite(series.marker).all(axis=1)
-    if seen.sum() < LEAST_FRAMES:
+    if seen.sum() < MIN_FRAMES:
         raise DelayError(
             f"only {int(seen.sum())} frames show the marker while the robot was sampled; the "
-            f"delay needs {LEAST_FRAMES}. Check that the marker is in view"
+            f"delay needs {MIN_FRAMES}. Check that the marker is in view"
         )
     speed = path.pixels(time[seen], 1)
-    if not np.sqrt(np.mean(np.sum(speed**2, axis=1))) > LEAST_SPEED:
+    if not np.sqrt(np.mean(np.sum(speed**2, axis=1))) > MIN_SPEED:
         raise DelayError("the gripper hardly moves in the picture: record a motion for the delay")
     return seen
 
@@ -152,7 +152,7 @@ def _linear_fit(time: np.ndarray, pixels: np.ndarray, path: _Path) -> tuple[floa
     solution, left = np.zeros(columns.shape[1]), target
     weight, normal = np.ones(len(target)), np.eye(columns.shape[1])
     for _ in range(HUBER_ROUNDS):
-        noise = max(1.4826 * float(np.median(np.abs(left))), LEAST_NOISE)
+        noise = max(1.4826 * float(np.median(np.abs(left))), MIN_NOISE)
         weight = np.minimum(1.0, HUBER_SDS * noise / np.maximum(np.abs(left), 1e-12))
         weight[np.abs(left) > OUTLIER_SDS * noise] = 0.0
         weighted = columns * weight[:, None] / noise**2

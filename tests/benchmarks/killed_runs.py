@@ -65,13 +65,13 @@ def command(stage, run, stir, *, again=False):
 
 
 def made(run):
-    """(file, identity, theta, seed) -> when it was made, of every simulation of a run."""
+    """(identity, theta, seed) -> when it was made, of every simulation of a run."""
     found = {}
-    for path in run.glob(SIMULATIONS):
+    if (path := run / SIMULATIONS).exists():
         with closing(sqlite3.connect(path)) as bank, suppress(sqlite3.OperationalError):
             # there may be a file without its table yet
             for row in bank.execute("SELECT identity, theta, seed, created FROM simulation"):
-                found[(path.name, *row[:3])] = row[3]
+                found[row[:3]] = row[3]
     return found
 
 
@@ -196,7 +196,7 @@ def faults(given, folder) -> Iterator[tuple[str, str]]:
         if fault:
             yield f"{stage}, {SIGNALS[number % len(SIGNALS)].name}", fault
     on_disk = [stage for stage in given.stages if stage != "record"]
-    for number in range(given.disks):
+    for number in range(given.disks if on_disk else 0):
         stage = on_disk[number % len(on_disk)]
         run, size = fresh(stage), int(np.exp(rng.uniform(*np.log(SMALL_DISK))))
         stopped = on_a_small_disk(command(stage, run, stir), size)

@@ -14,6 +14,7 @@ from bolfi_liquids import models
 from bolfi_liquids.calibration.summary import BAD_FIT_RATIO
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.prior import default_prior
+from bolfi_liquids.inputs.recording import planned_recording
 from bolfi_liquids.online.estimate import (
     OnlineEstimate,
     Problem,
@@ -26,7 +27,6 @@ from bolfi_liquids.online.estimate import (
 from bolfi_liquids.online.plan import (
     PartialRecording,
     align,
-    planned,
     stroke_ends,
 )
 from bolfi_liquids.online.record import BAD_FIT, sentence
@@ -44,7 +44,7 @@ ATTRS = {
     "liquid_density": 1000.0,
 }
 PATH = star(speed=0.1, height=0.235)
-PLAN = planned(PATH.time, PATH.position, ATTRS)
+PLAN = planned_recording(PATH.time, PATH.position, ATTRS)
 ENDS = stroke_ends(PLAN)
 TRUTH = {"viscosity": np.array([0.5]), "cohesion": np.array([0.4])}
 NOISE = 0.01
@@ -115,7 +115,7 @@ def test_missing_samples_equal_a_shorter_recording():
     of = problem()
     known, seen = made(of), aligned(4)
     samples = int(np.isfinite(seen.observed).all(axis=1).sum())
-    short = planned(PLAN.time[:samples], PATH.position[:samples], ATTRS)
+    short = planned_recording(PLAN.time[:samples], PATH.position[:samples], ATTRS)
     stirring = stir_simulator([short], 200)
     engine = Bolfi(
         of.prior,
@@ -238,7 +238,7 @@ def test_the_noise_of_a_fit_is_that_of_cameras_and_between_simulations(rng):
 def test_an_online_estimate_names_a_wrong_frame():
     """A stick that leans ahead of the gripper: the sign of a plane is wrong."""
     recording = bundled_recording("glycerin")
-    plan = planned(recording.time, recording.gripper.position, recording.attrs)
+    plan = planned_recording(recording.time, recording.gripper.position, recording.attrs)
     of = Problem(default_prior(), stir_simulator([plan], 200), OnlineSettings(design=8))
     ends = stroke_ends(plan)
     for sign, faults in ((1.0, 0), (-1.0, 1)):

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.motion import star
 
+from bolfi_liquids.inputs.recording import planned_recording
 from bolfi_liquids.online.plan import (
     MAX_DELAY_CHANGE,
     MAX_OFF_PLAN,
     PartialRecording,
     align,
-    planned,
     stroke_ends,
 )
 
 ATTRS = {"liquid_density": 1000.0}
 PATH = star(speed=0.1, height=0.235)
-PLAN = planned(PATH.time, PATH.position, ATTRS)
+PLAN = planned_recording(PATH.time, PATH.position, ATTRS)
 ENDS = stroke_ends(PLAN)
 
 
@@ -145,6 +145,6 @@ def test_arrays_that_are_no_recording_are_named(wrong):
 
 def test_a_plan_needs_a_density_and_a_path():
     with pytest.raises(ValueError, match="attribute liquid_density"):
-        planned(PATH.time, PATH.position, {})
+        planned_recording(PATH.time, PATH.position, {})
     with pytest.raises(ValueError, match="planned path"):
-        planned(PATH.time[::-1], PATH.position, ATTRS)
+        planned_recording(PATH.time[::-1], PATH.position, ATTRS)

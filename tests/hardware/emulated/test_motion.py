@@ -71,7 +71,7 @@ def test_twist_moves_the_tcp_straight_and_stops_it():
 
 def test_joint_speeds_reach_their_target_together():
     target = np.array([0.2, -0.1, 0, 0, 0, 0.4])
-    state = joint_speed(UR10, target, 1.0).step(JointState(HOME, ZERO), 0.1)
+    state = joint_speed(target, 1.0).step(JointState(HOME, ZERO), 0.1)
     assert state.speed == pytest.approx(target / 4)
     assert state.joints == pytest.approx(HOME + target / 4 * 0.05)
 
@@ -81,7 +81,7 @@ def test_impossible_motions_are_refused():
     for make in (
         lambda: servo(UR10, nan, 0.1, 300, 15.0),
         lambda: twist(MOUNTED, nan, 0.5),
-        lambda: joint_speed(UR10, ZERO, -1.0),
+        lambda: joint_speed(ZERO, -1.0),
     ):
         with pytest.raises(MotionError):
             make()

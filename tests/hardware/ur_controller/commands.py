@@ -102,7 +102,7 @@ def _speed(*, linear: bool) -> Command:
         if numbers is None:
             return
         target, rate, arm = np.array(numbers[:6]), numbers[6], program.arm.mounted
-        motion = twist(arm, target, rate) if linear else joint_speed(arm.arm, target, rate)
+        motion = twist(arm, target, rate) if linear else joint_speed(target, rate)
         program.begin([lambda _: motion], "speed")
         program.speeds_are_linear = linear
 
@@ -113,7 +113,7 @@ def _stop_plan(program: "Program", rate: float, *, linear: bool) -> Plan:
     mounted = program.arm.mounted
     if linear:
         return lambda _: twist(mounted, _ZERO, rate, ends=True)
-    return lambda _: joint_speed(mounted.arm, _ZERO, rate, ends=True)
+    return lambda _: joint_speed(_ZERO, rate, ends=True)
 
 
 def _speed_stop(program: "Program") -> None:

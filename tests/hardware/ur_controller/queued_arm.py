@@ -35,7 +35,7 @@ class QueuedArm(KinematicArm):
         self._going, self._elapsed, self.index = None, 0.0, 0
         self._plans = list(plans)
         if brake is not None and not self.resting:
-            self._going = joint_speed(self.mounted.arm, REST, brake, ends=True)
+            self._going = joint_speed(REST, brake, ends=True)
             self.index = -1
 
     def stop(self, rate: float) -> None:

@@ -65,7 +65,7 @@ def test_plans_follow_each_other_and_begin_from_rest():
     assert arm.state.joints == pytest.approx(goals[-1])
     arm.tick(DT)
     assert arm.resting
-    arm.begin([lambda state: joint_speed(UR10, ZERO + 0.2, 5.0)])
+    arm.begin([lambda state: joint_speed(ZERO + 0.2, 5.0)])
     for _ in range(20):
         arm.tick(DT)
     arm.begin([lambda state: joint_move(UR10, state.joints, HOME, 0.5, 2.0)], brake=3.0)
