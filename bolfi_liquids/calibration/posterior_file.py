@@ -60,6 +60,9 @@ def results_tree(
         tree[name] = DataTree(dataset)
     tree.attrs["seconds_simulator"] += check.seconds
     tree.attrs["least_viscosity"] = stirring.least_viscosity
+    tree.attrs["stick_radius_cells"] = [
+        round(setup.stick.radius / setup.cell, 2) for setup in stirring.setups
+    ]
     tree.attrs["liquid_density"] = stirring.recordings[0].number("liquid_density")
     return tree
 

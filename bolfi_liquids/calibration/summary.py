@@ -51,7 +51,7 @@ class SamplerStatus(StrEnum):
         """What to do."""
         return {
             SamplerStatus.CONVERGED: "the intervals of the posterior may be used",
-            SamplerStatus.NOT_CONVERGED: "calibrate again with more draws or another sampler",
+            SamplerStatus.NOT_CONVERGED: "calibrate again with more draws",
         }[self]
 
 

@@ -1,6 +1,7 @@
 """The command line; each command calls the function of the same name."""
 
 import signal
+import warnings
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Annotated, Any
@@ -266,6 +267,7 @@ app.add_typer(cli_check.app, name="check")
 
 def main() -> None:
     """Entry point of `bolfi-liquids`."""
+    warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"  # without its line
     if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # says how to go on, as Ctrl-C
     app()

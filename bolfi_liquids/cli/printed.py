@@ -64,7 +64,7 @@ def print_pour(pour: "Pour") -> None:
 
     facts = pour_facts(pour)
     table = _table("pour", "turn", "distance", "expected spillage", "in 19 of 20 cases")
-    for label, action in (("chosen", facts), ("at theta* alone", facts["plug_in"])):
+    for label, action in (("chosen", facts), ("for the best fit alone", facts["plug_in"])):
         numbers = ("turn", "distance", "spilled", "spilled_q95")
         table.add_row(label, *(action[name] for name in numbers))
     _console().print(table)

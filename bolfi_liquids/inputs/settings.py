@@ -200,8 +200,8 @@ class PourSettings:
 class CriticismSettings:
     """What decides a criticism besides its data."""
 
-    effects: Annotated[Names, helped("Effects to consider; all if none is given.")] = None
-    accept: Annotated[Names, helped("Effects that join the model whatever the verdict.")] = None
+    effects: Annotated[Names, helped("Effect to consider, else all. Repeatable.")] = None
+    accept: Annotated[Names, helped("Effect to add whatever the verdict. Repeatable.")] = None
     seed: Seed = 0
     batch: Annotated[Count, helped("Simulations in one call, where there is no executor.")] = 32
 

@@ -108,6 +108,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
             "given": digest_of_pours(run.path),
             "settings": asdict(settings),
             "cups": cups.settings(),
+            "forced": force,
         }
         run.keep("pour", pour.tree, made_from, pour.summary.to_json())
         return pour

@@ -17,6 +17,7 @@ from ..criticism.result import Criticism
 from ..criticism.source_summary import DifferingWindow, PourVerdict, SourceVerdict
 from ..criticism.summary import CriticismSummary
 from ..inference.criticism.verdict_kind import VerdictKind
+from ..models.numerics import TESTED_RATIO
 from ..pouring.draining import TENTH, Hold
 from ..pouring.result import ActionSummary, GivenPour, GivenSummary, Pour
 from ..pouring.spillage import ACTION
@@ -103,7 +104,15 @@ def calibration_facts(calibration: Calibration) -> Facts:
         "confirmed": summary.confirmed,
         "seconds": {name: f"{spent:.0f}" for name, spent in vars(summary.seconds).items()},
         "doubts": summary.emulator_warnings,
+        "untested": _untested_cells(calibration),
     }
+
+
+def _untested_cells(calibration: Calibration) -> str | None:
+    """The stick's radius in cells, where it is none that was compared with references."""
+    low, high = TESTED_RATIO
+    ratios = np.atleast_1d(calibration.tree.attrs.get("stick_radius_cells", [])).tolist()
+    return next((f"{ratio:.2f}" for ratio in ratios if not low <= ratio <= high), None)
 
 
 def fit_facts(summary: CalibrationSummary) -> Facts:

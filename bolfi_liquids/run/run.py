@@ -23,7 +23,7 @@ from ..errors import Argument, InputError
 from ..files import as_path, write_text
 from ..inputs.prior import read_prior
 from ..inputs.recording import Recording
-from ..inputs.settings import CalibrationSettings
+from ..inputs.settings import CalibrationSettings, CriticismSettings, PourSettings
 from ..wording import command
 from .given_pours import GIVEN_POURS, digest_of_pours
 from .lock import alone_in
@@ -199,9 +199,7 @@ class Run:
         if tree is None:
             for earlier in self._missing_before(step):
                 self.required(earlier)
-            stale = step != "calibrate" and self.why_not(step)
-            more = ", with the options it was made with" if stale else ""
-            raise InputError(why, where=str(self.path), fix=f"run{more}: {self.again(step)}")
+            raise InputError(why, where=str(self.path), fix=f"run: {self.again(step)}")
         return tree
 
     def _missing_before(self, step: str) -> list[str]:
@@ -253,7 +251,7 @@ class Run:
         return key_of(self.required("calibrate"))
 
     def again(self, step: str) -> str:
-        """The command that makes a step's result."""
+        """The command that makes a step's result, with the options of one that is readable."""
         if step == "calibrate":
             clean = (
                 ["--baseline", "CLEAN..."] if "baseline" in self.record.get("inputs", {}) else []
@@ -261,7 +259,22 @@ class Run:
             recordings = kept_paths(self.path, self.record) or ["RECORDING..."]
             words = ("calibrate", *recordings, *clean, "--out", self.path, "--resume")
             return command(*words, *self._options())
-        return command(step, self.path)
+        return command(step, self.path, *self._options_of(step))
+
+    def _options_of(self, step: str) -> list[str]:
+        """Options with which a criticism or a pour was made, where they are not the default."""
+        try:
+            made = json.loads(read_result(self.path / RESULTS[step]).attrs["made_from"])
+        except (OSError, ValueError):
+            return []
+        usual = asdict(CriticismSettings() if step == "criticise" else PourSettings())
+        changed = {k: v for k, v in made.get("settings", {}).items() if v != usual.get(k)}
+        files = {name: list(made.get(name, ())) for name in ("held_out", "baseline", "pours")}
+        options = []
+        for name, value in {**changed, **files}.items():
+            for one in value if isinstance(value, list) else [value]:
+                options += [f"--{name.replace('_', '-')}", str(one)]
+        return [*options, "--force"] if made.get("forced") else options
 
     def _look(self, step: str) -> "tuple[DataTree | None, str]":
         """A step's current result, or why there is none."""
@@ -464,5 +477,6 @@ def _unusable(path: Path, err: Exception) -> InputError:
     # the bank's own error names the path and another cure
     cause = err.__cause__ if isinstance(err.__cause__, sqlite3.Error) else err
     another = "restore it from a copy, or start again with another --out"
-    fix = f"make it writable, {another}" if isinstance(cause, sqlite3.Error) else another
+    writable = isinstance(cause, sqlite3.OperationalError)
+    fix = f"make it writable, {another}" if writable else another
     return InputError(f"cannot be used ({cause})", where=str(path), fix=fix)

@@ -316,11 +316,15 @@ class LogLikelihoodFamily:
     name: ClassVar[str] = "log_likelihood"
     acquisition: ClassVar[str] = "draws"
     replicates: ClassVar[bool] = False
-    any_shape: ClassVar[bool] = True
 
-    def learner(self, observed: np.ndarray) -> "LogLikelihoodFamily":
-        """Itself: log likelihoods are learned from as they are; the discrepancy is minus one."""
-        return self
+    def learner(self, observed: np.ndarray) -> "LogLikelihoodLearner":
+        return LogLikelihoodLearner()
+
+
+class LogLikelihoodLearner:
+    """Log likelihoods are learned from as they are; the discrepancy is minus one."""
+
+    any_shape: ClassVar[bool] = True
 
     def measure(self, signals: Sequence[np.ndarray | None]) -> Measured:
         """Sds of the noise [n, 1], NaN where none is given, and minus the log likelihoods of n

@@ -268,7 +268,7 @@ def test_warnings_of_the_engine(calibration):
         least_viscosity=0.0494,
     )
     latest = fit_facts(summary) | {"bad": None}
-    search = {"doubts": (), "few_searched": False, "misfit": False}
+    search = {"doubts": (), "few_searched": False, "misfit": False, "untested": None}
     facts = {"latest": latest, "calibration": search, "criticism": None, "pour": None}
     unconverged, _, thin = prose("warnings", facts | {"outdated": ()})
     assert unconverged in QUOTED

@@ -71,9 +71,12 @@ def poured(summary=POURED, rate=1.0, distance=0.03):
 @pytest.fixture
 def calibrated(calibration):
     """A calibration with nothing to warn of, but for changes of its numbers."""
+    tested = calibration.tree.copy()
+    tested.attrs["stick_radius_cells"] = [0.9]
 
     def of(**changes):
-        return replace(calibration, summary=replace(calibration.summary, **(FINE | changes)))
+        summary = replace(calibration.summary, **(FINE | changes))
+        return replace(calibration, tree=tested, summary=summary)
 
     return of
 
@@ -105,7 +108,7 @@ def test_nothing_is_said_where_nothing_is_wrong(warned):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"rhat_max": 1.2}, ["1.200", "--sampler"]),
+        ({"rhat_max": 1.2}, ["1.200", "--draws"]),
         ({"below_least_viscosity": 0.5, "least_viscosity": 0.03}, ["0.03 Pa s", "50 %"]),
         ({"emulator_warnings": ("too few runs",)}, ["surrogate", "too few runs"]),
     ],
@@ -128,6 +131,12 @@ def test_each_warning_of_a_calibration_is_given_alone(warned, calibrated, change
 def test_each_warning_of_a_criticism_is_given_alone(warned, changes, words):
     (warning,) = warned(criticism=None if changes is None else AGREES | changes)
     assert all(word in warning for word in words)
+
+
+def test_cells_that_were_compared_with_no_reference_are_told(warned, calibrated, calibration):
+    """200 particles make cells of three radii of the stick."""
+    (warning,) = warned(replace(calibrated(), tree=calibration.tree))
+    assert "0.33 cells" in warning and "--particles" in warning
 
 
 def test_much_that_is_spilled_is_told(warned):

@@ -38,7 +38,7 @@ def test_a_senseless_viscosity_is_refused_before_anything_starts():
 
 
 def test_a_stir_that_cannot_be_simulated_is_refused_before_the_session(tmp_path, monkeypatch):
-    def fails(_liquid, gripper, _setup, seeds):
+    def fails(_liquid, gripper, _setup, seeds, _effects):
         return np.full((len(seeds), len(gripper.time), 2), np.nan)
 
     monkeypatch.setattr(models, "stir", fails)
