@@ -33,10 +33,10 @@ if TYPE_CHECKING:
 N_DRAWS_SHOWN = 3
 """Posterior draws that are shown."""
 
-MAX_STIR_SECONDS = 6.0
+MAX_STIR_SECONDS = 3.0
 """Of a stir that is shown [s]."""
 
-FILM_RATE = 8.0
+FILM_RATE = 6.0
 """Pictures per second."""
 
 FILM_SHARE = 0.6

@@ -2,6 +2,7 @@
 
 import base64
 import json
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from importlib.resources import files
 from io import BytesIO
@@ -80,11 +81,17 @@ def written(
         lstrip_blocks=True,
     )
     facts = results.facts
+    films = partial(_films, results, compute, progress) if moving else dict
+    with ThreadPoolExecutor(1) as thread:
+        # workers make films while figures are drawn; without any, Taichi stays in this thread
+        made = None if compute.executor is None else thread.submit(films)
+        figures = figures_of(results)
+        shown = films() if made is None else made.result()
     page = environment.get_template(PAGE_TEMPLATE).render(
         **facts,
         prose=partial(prose, facts=facts),
-        figures=figures_of(results),
-        films=_films(results, compute, progress) if moving else {},
+        figures=figures,
+        films=shown,
         made_from=_made_from(results),
         style=(files("bolfi_liquids.data") / STYLE).read_text(encoding="utf-8"),
         record=results.calibration.record,
