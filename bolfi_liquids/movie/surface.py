@@ -17,7 +17,7 @@ from scipy.ndimage import affine_transform, gaussian_filter, map_coordinates
 from .view import OrthographicView
 
 CELLS_PER_SPACING = 2.5  # grid cells a particle spacing
-MIN_CELL_PIXELS = 3.0  # of a grid cell: a small picture needs no finer one
+MIN_CELL_PIXELS = 2.0  # of a grid cell: a small picture needs no finer one
 SMEAR_SD = 0.9  # sd of a smeared particle, by the spacing: particles on a grid lie unevenly
 SURFACE_LEVEL = 0.5  # of the rest density: here is the surface, where it is flat
 DROP_RADIUS = (3.0 / (4.0 * np.pi)) ** (1.0 / 3.0)  # of a particle's volume, by the spacing
