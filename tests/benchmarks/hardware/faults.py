@@ -242,9 +242,10 @@ def _stopped(recording: Path) -> bool:
 
 
 def _last_row(path: Path) -> float:
-    """Host time of a table's last whole row [s]."""
+    """Host time of a table's last whole row [s]; a frame's stamp is by this computer's clock."""
     rows = path.read_text(encoding="utf-8").splitlines()
-    host = rows[0].split(",").index("host")
+    names = rows[0].split(",")
+    host = names.index("host" if "host" in names else "stamp")
     whole = [row for row in rows[1:] if row.count(",") == rows[0].count(",")]
     return float(whole[-1].split(",")[host])
 
