@@ -1,4 +1,4 @@
-"""How far simulated stirs are from the Navier-Stokes equations at the true parameters."""
+"""Error of simulated stirs against the Navier-Stokes equations at the true parameters."""
 
 import numpy as np
 

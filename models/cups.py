@@ -156,7 +156,7 @@ class Cups(_Section, frozen=True):
 
     @property
     def contact_angle(self) -> float:
-        """Of the liquid with the source's wall and rim [rad]; below π/2 it wets them."""
+        """Contact angle with the source's wall and rim [rad]; below π/2 the liquid wets them."""
         return float(np.radians(self.source.contact_angle_deg))
 
     @property

@@ -1,4 +1,4 @@
-"""What an effect is: one coefficient whose neutral value leaves the base model as it was."""
+"""An effect: one coefficient whose neutral value leaves the base model as it was."""
 
 import math
 from collections.abc import Callable

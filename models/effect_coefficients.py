@@ -1,4 +1,4 @@
-"""From coefficients that a user gives to what they do to a liquid, a rig and a signal."""
+"""Apply the coefficients that a user gives to a liquid, a rig and a signal."""
 
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple

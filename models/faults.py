@@ -1,4 +1,4 @@
-"""How a simulation can go wrong: it stops, its result is NaN, and a warning says why."""
+"""Faults of a simulation: it stops, its result is NaN, and a warning says why."""
 
 import warnings
 

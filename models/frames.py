@@ -1,4 +1,4 @@
-"""Where the particles are while they are stirred or poured: for pictures, and for measuring."""
+"""Positions of the particles while they are stirred or poured, for pictures and measurements."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

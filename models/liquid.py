@@ -1,4 +1,4 @@
-"""What a liquid is to the simulator."""
+"""Parameters of a liquid."""
 
 from dataclasses import dataclass
 

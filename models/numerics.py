@@ -1,4 +1,4 @@
-"""How a liquid is cut into cells, steps and particles."""
+"""Discretisation of a liquid: cells, steps and particles."""
 
 import warnings
 from dataclasses import asdict, dataclass

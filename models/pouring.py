@@ -48,7 +48,7 @@ class PourResult:
 
 @dataclass(frozen=True)
 class Landings:
-    """Where the liquid of B pours passes the height of the receiver's rim.
+    """Points at which the liquid of B pours passes the height of the receiver's rim.
 
     Attributes:
         position: Of every particle from below the source's lip, towards the receiver and across
@@ -76,7 +76,7 @@ class Landings:
         return reach < radius[..., None]  # a NaN is in no receiver
 
     def into(self, distance: ArrayLike, radius: ArrayLike) -> PourResult:
-        """What receivers would have caught, in the shape to which all broadcast.
+        """Fractions that receivers would have caught, in the shape to which all broadcast.
 
         Args:
             distance, radius: As for `inside`.
@@ -98,7 +98,7 @@ def pour(
     particles: int = 0,
     effects: Mapping[str, ArrayLike] | None = None,
 ) -> PourResult:
-    """Where the liquid ends when the source turns about its lip to its final angle and holds.
+    """Shares of the liquid, by where it ends, when the source turns about its lip and holds.
 
     Args:
         liquid: B liquids; scalars are shared.
@@ -130,7 +130,7 @@ def landings(
     particles: int = 0,
     effects: Mapping[str, ArrayLike] | None = None,
 ) -> Landings:
-    """Where the liquid lands, for receivers at any distance; arguments and errors of `pour`.
+    """Points at which the liquid lands, for receivers at any distance; arguments as for `pour`.
 
     `Landings.into` makes of them what `pour` would have returned, the receiver's distance and
     radius in `cups` aside.
@@ -150,7 +150,7 @@ class PourBatch(NamedTuple):
 
 
 def watched_landings(batch: PourBatch, watch: Watch | None = None) -> Landings:
-    """What `landings` returns, while `watch` looks at each of its scenes."""
+    """Like `landings`, while `watch` looks at each of its scenes."""
     found, cups = _flights(batch, watch), batch.cups
     drop = cups.pour.lip_height - cups.receiver.height
     position = np.stack([landing_of(flights, drop) for flights in found])
@@ -176,7 +176,7 @@ def draining(batch: PourBatch, held: ArrayLike) -> np.ndarray:
 
 
 def _flights(batch: PourBatch, watch: Watch | None = None) -> list[Flights]:
-    """What leaves the source in each pour."""
+    """Particles that leave the source in each pour."""
     cups, seeds = batch.cups, checked_seeds(batch.seeds)
     acting = acting_in("pour", with_adhesion(batch.liquid, batch.effects, len(seeds)), len(seeds))
     rate = _checked_rate(batch.angular_velocity, len(seeds))

@@ -1,4 +1,4 @@
-"""What an effect in the rig may change: the hardware of each simulated stir."""
+"""Hardware of each simulated stir, which an effect in the rig may change."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -124,7 +124,7 @@ def check_time_limit(done: int, steps: int) -> None:
 
 
 class Watch(NamedTuple):
-    """What looks on while a scene runs; it changes nothing in it.
+    """An observer of a running scene, in which it changes nothing.
 
     Attributes:
         rate: Looks per second of the simulation, besides those at its start and at its end.

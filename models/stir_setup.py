@@ -1,4 +1,4 @@
-"""What fixes a stirring simulation besides liquid, path and seed: cup, stick, discretisation."""
+"""Setup of a stirring simulation besides liquid, path and seed: cup, stick, discretisation."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -16,7 +16,7 @@ FIRST_SECONDS, FIRST_SAMPLES = 0.15, 5  # of a recording, which show how the sti
 
 
 class HasRig(Protocol):
-    """What a setup reads from a recording."""
+    """The part of a recording that a setup reads."""
 
     @property
     def attrs(self) -> Mapping[str, Any]: ...

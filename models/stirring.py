@@ -55,7 +55,7 @@ def watched_stir(
     effects: Mapping[str, ArrayLike] | None,
     watch: Watch | None = None,
 ) -> np.ndarray:
-    """What `stir` returns, while `watch` looks at each of its scenes."""
+    """Like `stir`, while `watch` looks at each of its scenes."""
     seeds = checked_seeds(seeds)
     size = len(seeds)
     acting = acting_in("stir", with_adhesion(liquid, effects, size), size)

@@ -1,4 +1,4 @@
-"""A gripper's measured path, and where it is at the steps of a simulation."""
+"""A gripper's measured path, and its positions at the steps of a simulation."""
 
 from typing import Protocol
 
@@ -37,7 +37,7 @@ def step_path(gripper: PivotPath, step: float) -> np.ndarray:
 
 
 def top_speed(gripper: PivotPath, step: float) -> float:
-    """Of the pivot [m/s], over intervals of a step [s] or a sample, whichever is longer."""
+    """Top speed of the pivot [m/s] over intervals of a step or a sample, whichever is longer."""
     path = step_path(gripper, step)
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).max(initial=0.0) / step)
 

@@ -1,4 +1,4 @@
-"""Where the particles of a filled vessel start."""
+"""Initial positions of the particles in a filled vessel."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""What walls leave open of each cell and face, from samples of a signed distance."""
+"""Open shares of cells and faces beside walls, from samples of a signed distance."""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -169,7 +169,7 @@ class _Layers(NamedTuple):
 
 
 def _sides(side: Side | None, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Of the points of a lattice, shape (z, y, x)."""
+    """Sides of the wall on which a lattice's points lie, shape (z, y, x)."""
     where = ABOVE if side is None else side(x, y[:, None], z[:, None, None])
     return np.broadcast_to(where, (len(z), len(y), len(x))).astype(np.int8)
 
@@ -220,7 +220,7 @@ def _along(grid: Grid, axis: int) -> np.ndarray:
 
 
 def _distances(distance: Distance, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Of the points of a lattice, shape (z, y, x)."""
+    """Signed distances of a lattice's points, shape (z, y, x)."""
     away = distance(x, y[:, None], z[:, None, None])
     return np.broadcast_to(away, (len(z), len(y), len(x)))
 
@@ -240,12 +240,12 @@ def _box(off: np.ndarray) -> np.ndarray:
 
 
 def _hat(off: np.ndarray) -> np.ndarray:
-    """As particles deposit."""
+    """The kernel by which particles deposit."""
     return np.maximum(1.0 - np.abs(off), 0.0)
 
 
 def _means(samples: np.ndarray, kernel: Kernel, at: tuple[float, ...]) -> np.ndarray:
-    """Around a point of each cell, in the order of the cells; samples reach a cell further."""
+    """Means around a point of each cell, in their order; samples reach a cell further."""
     for axis in (2, 1, 0):  # x at last: its samples are neighbours in memory
         samples = _means_along(samples, kernel, at, axis)
     return samples.ravel()

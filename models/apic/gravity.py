@@ -1,3 +1,3 @@
-"""What pulls liquids down."""
+"""Gravity."""
 
 GRAVITY = 9.81  # m/s²

@@ -150,7 +150,7 @@ class LiquidState:
         count: ti.types.ndarray(ti.i32, 2),
         liquid: ti.types.ndarray(ti.f32, 3),
     ):
-        """Liquid at rest, in equilibrium.
+        """Fill in liquid at rest, in equilibrium.
 
         Args:
             position: Of the particles [m], shape [groups, LANES, n, 3].
@@ -189,18 +189,18 @@ class LiquidState:
                     self.pressure[g, m][lane] = weight * ti.max(self.level[g][lane] - z, 0.0)
 
     def set_coefficients(self, coefficients):
-        """Of the effects, shape [effects, groups, LANES]."""
+        """Set the effects' coefficients, shape [effects, groups, LANES]."""
         for effect, of_groups in enumerate(coefficients):
             for g, values in enumerate(of_groups):
                 self.coefficient[effect, g] = values
 
     @ti.func
     def begin_step(self, g, step):
-        """What a scene does with a group before its particles are accelerated."""
+        """Hook: a scene's work on a group before its particles are accelerated."""
 
     @ti.kernel
     def march(self, groups: ti.i32, start: ti.i32, stop: ti.i32):
-        """Steps start..stop-1 of so many groups, of which none waits for another."""
+        """March so many groups from step `start` to `stop` - 1; none waits for another."""
         for n in range(groups * STRIDE):
             if n % STRIDE == 0:
                 for step in range(start, stop):

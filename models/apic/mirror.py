@@ -35,7 +35,7 @@ def clear_images(s, g):
 
 @ti.func
 def fold(s, g):
-    """What particles have deposited before the mirror belongs behind it."""
+    """Move what particles have deposited before the mirror to where it belongs, behind it."""
     for n in range(images(s)):
         m, o = image(s, n)
         s.volume[g, o] = s.volume[g, o] + s.volume[g, m]
@@ -54,7 +54,7 @@ def reflect_cells(s, g, x: ti.template()):
 
 @ti.func
 def reflect_vectors(s, g, x: ti.template()):
-    """Of cells, not of faces."""
+    """Reflect vectors of cells, not of faces."""
     for n in range(images(s)):
         m, o = image(s, n)
         x[g, 0, m] = x[g, 0, o]
@@ -64,7 +64,7 @@ def reflect_vectors(s, g, x: ti.template()):
 
 @ti.func
 def reflect_velocity(s, g):
-    """Nothing passes the mirror."""
+    """Reflect velocities, so that nothing passes the mirror."""
     S = strides(s)
     for n in range(images(s)):
         m, o = image(s, n)

@@ -1,4 +1,4 @@
-"""Where simulations stand among the lanes of groups that march at the same time."""
+"""Places of simulations among the lanes of groups that march at the same time."""
 
 import math
 import os
@@ -14,7 +14,7 @@ GROWTH = 1.5  # of the room from one scene to the next
 
 
 def processors() -> int:
-    """That this process may use: at most as many as Taichi's threads."""
+    """Number of processors that this process may use: at most as many as Taichi's threads."""
     there = os.cpu_count() or 1
     if hasattr(os, "sched_getaffinity"):
         there = len(os.sched_getaffinity(0))
@@ -32,7 +32,7 @@ def room_for(needed: float, least: int) -> int:
 
 @dataclass(frozen=True)
 class Places:
-    """Of `size` simulations.
+    """The lanes and groups of `size` simulations.
 
     Groups share them evenly, so that few keep all processors busy. Neighbours march together.
 
@@ -55,7 +55,7 @@ class Places:
 
     @property
     def groups(self) -> int:
-        """That are used."""
+        """Number of groups in use."""
         return int(self.slots[-1]) // self.lanes + 1
 
     def spread(self, values: np.ndarray) -> np.ndarray:

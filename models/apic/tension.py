@@ -28,7 +28,7 @@ LEAST_MASS = 0.05  # of a face, in full cells, that tension accelerates
 
 @ti.func
 def pull_surface(s, g):
-    """What tension does to the velocities in a step.
+    """Change the velocities by a step's surface tension.
 
     It works in fields that the viscosity fills anew: the colour's gradients to free surfaces and to
     walls are in `product` and `friction`, the stress in `rest` (along the axes) and `shear` (around
@@ -95,7 +95,7 @@ def filled(s, g, m):
 
 @ti.func
 def beyond(s, g, a, face, step):
-    """What acts on the next two faces beyond a surface; no wall and no other filled cell is
+    """Force that acts on the next two faces beyond a surface; no wall and no other filled cell is
     passed."""
     further = ti.min(face, face + step)  # the cell behind the face
     first = s.carries[a, face] * (1.0 - filled(s, g, further))
@@ -122,7 +122,7 @@ def near_filled(s, g, a, cell, step):
 
 @ti.func
 def find_gradients(s, g):
-    """Of the colour."""
+    """Find the gradients of the colour."""
     S = strides(s)
     reflect_cells(s, g, s.fraction)
     for n in range(s.arounds[g]):

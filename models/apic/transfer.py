@@ -237,7 +237,7 @@ def motion_of(s, g, lane, n):
 
 @ti.func
 def place_after(s, x, v, slope):
-    """Where a particle is after a step, to second order [m]."""
+    """Position of a particle after a step, to second order [m]."""
     dt, per_cell = s.dt[None], 1.0 / s.cell[None]
     return x + dt * (v + 0.5 * dt * per_cell * (slope @ v))
 

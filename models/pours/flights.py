@@ -1,4 +1,4 @@
-"""What has left the surroundings of the lip: each particle flies as a stone does."""
+"""Particles that have left the surroundings of the lip: each flies as a stone does."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from ..apic.gravity import GRAVITY
 
 
 class Flights(NamedTuple):
-    """Of the particles of half a cup that have left its region, in that order.
+    """Flights of the particles of half a cup that have left its region, in that order.
 
     Attributes:
         place, velocity: In the room's frame, whose origin is the lip [m] and [m/s], shape (n, 3).
@@ -49,7 +49,7 @@ class Flights(NamedTuple):
 
 
 def landing_of(flights: Flights, drop: float) -> np.ndarray:
-    """Where the whole cup's liquid comes to a height `drop` below the lip [m].
+    """Points at which the whole cup's liquid comes to a height `drop` below the lip [m].
 
     Returns:
         Towards the receiver and across, float32 of shape (2 particles, 2), in the order in which

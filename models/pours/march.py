@@ -52,7 +52,7 @@ class Pours(NamedTuple):
 
 
 class PourRotation(NamedTuple):
-    """How cups turn: to `final_angle` [rad] and then for `hold` [s], in steps of `dt` [s]."""
+    """Rotation of cups to `final_angle` [rad], held for `hold` [s], in steps of `dt` [s]."""
 
     final_angle: float
     hold: float
@@ -66,7 +66,7 @@ def march(
     effects: tuple[Effect, ...] = (),
     watch: Watch | None = None,
 ) -> list[Flights]:
-    """What leaves the cup in each pour.
+    """Particles that leave the cup in each pour.
 
     Warns:
         FailedSimulation: a pour went wrong.
@@ -92,7 +92,7 @@ def _like(pours: Pours, size: int) -> Sequence[np.ndarray]:
 
 
 def _together(vessel, pours: Pours, turn: PourRotation, effects, watch) -> list[Flights]:
-    """What `march` returns, of at most as many pours as there are lanes."""
+    """Like `march`, for at most as many pours as there are lanes."""
     from ..apic.lanes import LANES
 
     places = Places(len(pours.seeds), GROUPS, LANES)

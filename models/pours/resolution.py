@@ -30,7 +30,7 @@ class Filled(NamedTuple):
 
     @property
     def volume(self) -> float:
-        """Of the liquid [m³]."""
+        """Volume of the liquid [m³]."""
         return math.pi * self.radius**2 * self.fill
 
 
@@ -47,7 +47,7 @@ def cell_for(cup: Filled, particles: int = 0) -> float:
 
 
 def particles_for(cup: Filled, cell: float) -> float:
-    """How many fill cells of an edge [m], about."""
+    """Approximate number of particles that fill cells of an edge [m]."""
     return PER_CELL * cup.volume / cell**3
 
 
@@ -62,7 +62,7 @@ def steps_for(height: float, cell: float, rate: np.ndarray) -> np.ndarray:
 
 
 def settings(cup: Filled, particles: int = 0) -> dict[str, Any]:
-    """What decides how pours are cut up, as plain numbers."""
+    """Everything that fixes the discretisation of pours, as plain numbers."""
     return {
         "cell": cell_for(cup, particles),
         "per_cell": PER_CELL,

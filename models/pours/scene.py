@@ -102,7 +102,7 @@ class PouringScene(WettingLiquid):
 
     @ti.func
     def angle_after(self, g, lane, steps):
-        """By which the cup has turned after so many steps."""
+        """Angle by which the cup has turned after so many steps."""
         turned = self.rate_of_turn[g, lane] * steps * self.dt[None]
         return ti.min(turned, self.final_angle[g, lane])
 
@@ -153,7 +153,7 @@ class PouringScene(WettingLiquid):
 
     @ti.func
     def keep_off_wall(self, before, after, velocity):
-        """Where a particle comes to that the walls stop, and its velocity."""
+        """Position and velocity of a particle that the walls stop."""
         x, v = after, velocity
         off = OFF_WALL * self.cell[None]
         inner, outer = self.radius[None], self.radius[None] + self.rim[None]
@@ -207,7 +207,7 @@ class PouringScene(WettingLiquid):
 
     @ti.func
     def move_on(self, g, lane, step):
-        """Particles move; those that leave fly on, and the last takes the place of each."""
+        """Move the particles; those that leave fly on, and the last takes the place of each."""
         n, last, energy, fastest = 0, self.count[g, lane], 0.0, 0.0
         while n < last:
             v, slope = motion_of(self, g, lane, n)
@@ -234,7 +234,7 @@ class PouringScene(WettingLiquid):
 
     @ti.func
     def end(self, g, lane, step):
-        """What is outside of the cup at the end flies on; the rest comes first."""
+        """Let what is outside of the cup at the end fly on; the rest comes first."""
         for n in range(self.count[g, lane]):
             x = self.position[g, lane, n]
             if x[2] < 0.0 and self.out(x) < self.radius[None] + ON_WALL:

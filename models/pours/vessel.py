@@ -55,7 +55,7 @@ class Vessel:
 
     @property
     def under(self) -> float:
-        """How far below the rim, outside of the cup, the region ends [m]."""
+        """Depth below the rim at which the region ends outside of the cup [m]."""
         return UNDER * self.radius
 
     def grid(self) -> Grid:
@@ -67,24 +67,24 @@ class Vessel:
         return Grid(self.cell, (x + nx, y + ny, z + nz), origin, mirrored=True)
 
     def distance(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Of points from the wall and the floor [m], negative within them."""
+        """Distance of points from the wall and the floor [m], negative within them."""
         out, bottom = np.hypot(x + self.radius, y), -self.height - BELOW_FLOOR
         wall = _from_ring(out, z, (self.radius, self.radius + RIM), (bottom, 0.0))
         floor = _from_ring(out, z, (-1.0, self.radius + RIM), (bottom, -self.height))
         return np.minimum(wall, floor)
 
     def side(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Of the wall on which points are."""
+        """Side of the wall on which points lie."""
         out = np.hypot(x + self.radius, y)
         below = np.where(out < self.radius + 0.5 * RIM, INSIDE, OUTSIDE)
         return np.where(z > 0.0, ABOVE, below)
 
     def geometry(self) -> Geometry:
-        """Nothing flows through the mirror."""
+        """Open shares of cells and faces; nothing flows through the mirror."""
         return _geometry(self)
 
     def particles(self, per_cell: int, seed: int) -> np.ndarray:
-        """Where they start [m], shape (n, 3)."""
+        """Initial positions of the particles [m], shape (n, 3)."""
         cup = Cylinder(self.radius, (-self.radius, 0.0, -self.height))
         return fill_cup(self.grid(), cup, self.fill, per_cell, seed)
 
@@ -125,7 +125,7 @@ def turned(points: np.ndarray, angle: float) -> np.ndarray:
 def _from_ring(
     out: np.ndarray, z: np.ndarray, radii: tuple[float, float], heights: tuple[float, float]
 ) -> np.ndarray:
-    """Distance from what lies between two radii and two heights."""
+    """Distance from a ring between two radii and two heights."""
     aside = np.maximum(radii[0] - out, out - radii[1])
     over = np.maximum(heights[0] - z, z - heights[1])
     at_corner = np.hypot(np.maximum(aside, 0.0), np.maximum(over, 0.0))

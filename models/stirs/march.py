@@ -81,7 +81,7 @@ def march(
 
 
 def _together(setup, stirs: Stirs, step, effects, watch) -> np.ndarray:
-    """What `march` returns, of at most as many stirs as there are lanes."""
+    """Like `march`, for at most as many stirs as there are lanes."""
     from ..apic.lanes import LANES
 
     cup, places = setup.cup, Places(len(stirs.seeds), GROUPS, LANES)

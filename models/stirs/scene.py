@@ -34,7 +34,7 @@ class StirringScene(UprightCups):
 
     @ti.func
     def acceleration(self, g, lane, x):
-        """Of a particle at x [m], by what acts on all liquid [m/s²]."""
+        """Acceleration of a particle at x [m] by what acts on all liquid [m/s²]."""
         return vec3(0.0, 0.0, -GRAVITY)
 
     @ti.func
@@ -94,7 +94,7 @@ class StirringScene(UprightCups):
         self.path, self.directions, self.shown = path, directions, count
 
     def march(self, start, stop):
-        """Steps start..stop-1."""
+        """March from step `start` to `stop` - 1."""
         self._march(len(self.path), start, stop, self.path, self.directions)
 
     def view(self, step):

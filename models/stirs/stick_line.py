@@ -93,7 +93,7 @@ class StickLine:
 
 @ti.func
 def rows(t):
-    """Of cells along x in the three kernels of a node; a bound that is not known while compiling
+    """Rows of cells along x in the kernels of a node; a bound that is not known while compiling
     keeps the loops small."""
     return 3 * t.tall[None] * 2 * t.half[None]
 
@@ -133,7 +133,7 @@ def place_node(s, t, g, lane, n, x):
 
 @ti.func
 def liquid_at(s, t, g, lane, n):
-    """What a node sees of each component: full cells of liquid or wall."""
+    """Full cells of liquid or wall around a node, by component."""
     seen = vec3(0.0)
     for r in range(rows(t)):
         a, first, w = row(s, t, g, lane, n, r)
@@ -145,7 +145,7 @@ def liquid_at(s, t, g, lane, n):
 
 @ti.func
 def velocity_at(s, t, g, lane, n):
-    """Of the liquid, as a node sees it [m/s]; walls are liquid at rest."""
+    """Velocity of the liquid, as a node sees it [m/s]; walls are liquid at rest."""
     u = vec3(0.0)
     for r in range(rows(t)):
         a, first, w = row(s, t, g, lane, n, r)
@@ -173,7 +173,7 @@ def push_liquid(s, t, g, lane, n, change):
 
 @ti.func
 def arm_of(s, t, g, lane, n):
-    """From the pivot to a node [m]."""
+    """Vector from the pivot to a node [m]."""
     return (t.length[None] - (TIP + n + 0.5) * s.cell[None]) * t.direction[g, lane]
 
 
@@ -204,7 +204,7 @@ def start_line(s, t, g, lane):
 
 @ti.func
 def recoil_of(s, t, g, lane):
-    """How much a push of all nodes alike changes the stick's velocity over the liquid's, beyond
+    """Change of the stick's velocity over the liquid's by a push of all nodes alike, beyond
     what a step takes without overshooting: on coarse cells the nodes outweigh the stick."""
     density, volume = s.density[g][lane], t.node_volume[None] * s.cell[None] ** 3
     moment = 0.0
@@ -247,7 +247,7 @@ def slip_line(s, t, g, lane, time):
 
 @ti.func
 def turn_stick(s, t, g, lane, torque, added):
-    """A step of the pendulum, by weight, lift and the pivot's acceleration, and by the liquid's
+    """Advance the pendulum by a step, under weight, lift, the pivot's acceleration and the liquid's
     torque [N m] and added inertia [kg m²]; then its end stops at the wall and the floor."""
     dt, length, radius = s.dt[None], t.length[None], t.radius[None]
     mass, per_length = t.mass[g, lane], s.density[g][lane] * math.pi * radius**2
