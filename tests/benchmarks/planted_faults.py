@@ -63,7 +63,7 @@ def changed(node: ast.AST) -> ast.expr | None:
     match other:
         case ast.Compare(ops=[operator, *_]) if type(operator) in SWAPPED:
             other.ops[0] = SWAPPED[type(operator)]()
-        case (ast.BinOp(op=operator) | ast.BoolOp(op=operator)) if type(operator) in SWAPPED:
+        case ast.BinOp(op=operator) | ast.BoolOp(op=operator) if type(operator) in SWAPPED:
             other.op = SWAPPED[type(operator)]()
         case ast.Constant(value=bool(value)):
             other.value = not value
@@ -163,10 +163,8 @@ def main() -> int:
             fault.file.write_bytes(source)
         caught += found
         before = " ".join(source[fault.start : fault.stop].decode().split())
-        print(
-            f"{'caught' if found else 'MISSED'} {fault.file}:{fault.line}: {before} -> {fault.text}",
-            flush=True,
-        )
+        verdict = "caught" if found else "MISSED"
+        print(f"{verdict} {fault.file}:{fault.line}: {before} -> {fault.text}", flush=True)
     print(f"{caught} of {len(chosen)} caught")
     return 0
 
