@@ -65,7 +65,7 @@ UR10E = DhArm(
     joint_limit=2.0 * math.pi,
     joint_speed=_SPEEDS,
 )
-ARMS = {"ur10": UR10, "ur10e": UR10E}
+ARMS = {"cb3": UR10, "e-series": UR10E}
 
 
 class Inverse(NamedTuple):

@@ -11,17 +11,10 @@ import numpy as np
 from ..arm import Tool
 from ..errors import MotionRejected
 from ..motion.cup_frame import cup_frame
-from ..motion.kinematics import (
-    UR10,
-    UR10E,
-    DhArm,
-    follow,
-    inverse,
-)
+from ..motion.kinematics import ARMS, DhArm, follow, inverse
 from ..motion.stir_paths import PosePath
 from ..rig import AxisLimits, Limits, Rig
 
-ARMS = {"cb3": UR10, "e-series": UR10E}
 MAX_TILT = {
     "stirring": np.radians(15.0),
     "pouring": np.radians(150.0),

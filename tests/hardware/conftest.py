@@ -129,7 +129,7 @@ class SteppedControl:
         self.clock.sleep(2.0)
         assert self.emulator.controller.snapshot.resting
         assert self.emulator.controller.snapshot.runtime_state == 1
-        assert self.emulator.controller.arm.started == 1
+        assert self.emulator.controller.started == 1
         (stopped,), (event,) = self.reported(Stopped), self.events("stopped")
         assert (event["reason"], event["guard"]) == (stopped.reason, stopped.guard)
         return stopped, max(self.moved) - acted[0]

@@ -329,7 +329,7 @@ def test_a_dry_run_looks_and_refuses_to_move(control):
     # the controller's own tool differs from the rig's file, which the look tells
     (checked,) = one.reports
     assert "kinematics" in failures(checked.checks)
-    assert one.emulator.controller.arm.started == 0
+    assert one.emulator.controller.started == 0
     assert one.emulator.controller.snapshot.runtime_state == 1
 
 
@@ -339,7 +339,7 @@ def test_an_arm_outside_its_box_is_not_armed(control):
     (checked,) = one.reports
     assert "box: the tool is at" in failures(checked.checks)
     assert one.events("refused") and checked.pose is None
-    assert one.emulator.controller.arm.started == 0
+    assert one.emulator.controller.started == 0
 
 
 POUR = pour_path(
