@@ -9,7 +9,6 @@ import numpy as np
 
 from ..host_clock import REAL_CLOCK, HostClock
 from ..rendering.drawing import Stage, exposure_times, render
-from ..rendering.faults import fault_of
 from ..rendering.world import World, WorldState
 from ..vision.frame import Frame
 
@@ -24,7 +23,7 @@ class Timing:
     Attributes:
         rate: Frames per second.
         latency: From the middle of the exposure to the frame's arrival [s].
-        seed: Of noise and faults.
+        seed: Of the noise.
     """
 
     rate: float = 30.0
@@ -76,8 +75,7 @@ class RenderedCamera:
         stage = self._stage
         moments = exposure_times(exposed, stage.look)
         states = [self._world.state(float(moment)) for moment in moments]
-        fault = fault_of(index, stage.look.faults, stage.area, self._timing.seed)
-        image = render(stage, states, self._rng, fault)
+        image = render(stage, states, self._rng)
         stamp = exposed + self._timing.latency
         self._write_truth(index, stamp, states[len(states) // 2])
         return Frame(index, stamp, image)

@@ -33,7 +33,7 @@ class HiddenLiquid:
 
     Attributes:
         viscosity: Dynamic [Pa s].
-        seed: Of the pictures' noise and faults, and of the liquid's particles.
+        seed: Of the pictures' noise, and of the liquid's particles.
         stir: How the stick hangs while the liquid is stirred, in the cup's frame; None where
             nobody has simulated that: the stick hangs straight down.
     """
