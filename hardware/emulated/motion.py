@@ -58,7 +58,7 @@ class KinematicArm:
 
     def reaches(self, pose: np.ndarray) -> bool:
         """Whether the arm reaches a pose at all."""
-        return inverse(self.model, pose, self.state.joints, tcp=self.tcp).status != "unreachable"
+        return inverse(self.model, pose, self.state.joints, tcp=self.tcp) is not None
 
     def follow(
         self, pose: np.ndarray, lookahead: float = LOOKAHEAD, gain: float = SERVO_GAIN
@@ -69,12 +69,12 @@ class KinematicArm:
             MotionError: The pose is not finite or out of reach.
         """
         found = inverse(self.model, pose, self.state.joints, tcp=self.tcp)
-        if found.status == "unreachable":
+        if found is None:
             raise MotionError(f"no joints for pose {np.round(pose, 4).tolist()}")
         self._brake = 0.0
         self._servo = partial(
             servo,
-            target=found.joints,
+            target=found,
             lookahead=lookahead,
             gain=gain,
             fastest=np.array(self.model.joint_speed),

@@ -272,12 +272,12 @@ def _first_joints(pose: np.ndarray, space: Workspace, joints: np.ndarray | None)
     if not np.isfinite(near).all():
         raise _rejected(f"the arm's joints {near.tolist()} are not finite", _when(0.0))
     first = inverse(space.arm, pose, near, tcp=space.tcp)
-    if first.status == "unreachable":
+    if first is None:
         raise _rejected("no joints reach its first pose", _when(0.0))
-    away = float(np.abs(first.joints - near).max())
+    away = float(np.abs(first - near).max())
     if joints is not None and not away <= JOINT_AGREEMENT:
         raise _rejected(f"its first pose is {away:.2f} rad of a joint from the arm", _when(0.0))
-    return first.joints
+    return first
 
 
 def _check_reach(part: _Part, space: Workspace, rig: Rig, joints: np.ndarray) -> np.ndarray:

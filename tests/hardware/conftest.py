@@ -214,7 +214,7 @@ def stepped(tmp_path, stepped_loop, step_emulator, at_once):
     def make(rig: Rig, tool: Tool, start, *, armed: bool = True, cameras: bool = False):
         space, clock = workspace(rig, tool), SteppedClock()
         base = cup_frame(rig.cup).to_base(start)
-        joints = inverse(space.arm, base, space.start, tcp=space.tcp).joints
+        joints = inverse(space.arm, base, space.start, tcp=space.tcp)
         emulator = step_emulator(clock, joints=tuple(joints.tolist()), seed=1)
         controller = ur.URController(emulator.address)
         probes = base[None] if armed else np.empty((0, 6))
