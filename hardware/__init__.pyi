@@ -19,7 +19,6 @@ from .safety.preflight import Check as Check
 from .session.cameras import webcams as webcams
 from .session.confirmation import Confirmation as Confirmation
 from .session.confirmation import confirm as confirm
-from .session.progress import Phase as Phase
 from .session.progress import SessionInterrupted as SessionInterrupted
 from .session.progress import SessionStopped as SessionStopped
 from .session.progress import Status as Status

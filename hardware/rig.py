@@ -33,7 +33,6 @@ class Robot(RigSection, frozen=True):
     """The arm and what is mounted on its flange.
 
     Attributes:
-        driver: Which driver moves it.
         host: Address of its controller.
         controller: Its generation.
         rate: Of the motion loop [Hz].
@@ -47,7 +46,6 @@ class Robot(RigSection, frozen=True):
             configurations works; with them `rig_checks` tells where the cup stands.
     """
 
-    driver: Literal["ur"] = "ur"
     host: str
     controller: Literal["cb3", "e-series"] = "cb3"
     rate: Annotated[

@@ -292,7 +292,7 @@ def _source_cup(rig: Rig, space: Workspace) -> Faults:
 
 def _start(rig: Rig, space: Workspace) -> Faults:
     goal = cup_frame(rig.cup).to_base(above_cup(rig))
-    if inverse(space.arm, goal, space.start, tcp=space.tcp).status == "unreachable":
+    if inverse(space.arm, goal, space.start, tcp=space.tcp) is None:
         yield RigFault(
             "cup.position",
             f"{list(rig.cup.position)} m: the arm does not reach the place above the cup",

@@ -128,9 +128,9 @@ def _read(path: Path) -> list[np.ndarray]:
 def _taken(camera: "Camera") -> Pictures:
     """Pictures of the board and of the plumb line, each once a person is ready."""
     from ..hardware.cameras import CameraError
-    from ..hardware.session.cameras import RigCamera
+    from ..hardware.session.cameras import open_camera
 
-    with closing(RigCamera(camera)()) as source:
+    with closing(open_camera(camera)) as source:
 
         def after(question: str) -> np.ndarray:
             input(question)

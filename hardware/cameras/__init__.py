@@ -4,7 +4,7 @@ from ..vision.frame import Frame
 from .base import CameraError, FrameSource
 from .files import FilesCamera
 from .rendered import RenderedCamera, Timing
-from .webcam import Webcam, WebcamSettings
+from .webcam import Webcam
 
 __all__ = [
     "CameraError",
@@ -14,5 +14,4 @@ __all__ = [
     "RenderedCamera",
     "Timing",
     "Webcam",
-    "WebcamSettings",
 ]

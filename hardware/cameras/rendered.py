@@ -1,16 +1,14 @@
 """A camera that renders what a world shows, in real time."""
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 
 from ..host_clock import REAL_CLOCK, HostClock
+from ..recorder.csv_file import CsvAppender
 from ..rendering.drawing import Stage, exposure_times, render
-from ..rendering.faults import fault_of
-from ..rendering.world import World, WorldState
+from ..rendering.world import World
 from ..vision.frame import Frame
 
 MAX_LATENESS = 0.2  # s; a camera that is further behind leaves frames out
@@ -24,7 +22,7 @@ class Timing:
     Attributes:
         rate: Frames per second.
         latency: From the middle of the exposure to the frame's arrival [s].
-        seed: Of noise and faults.
+        seed: Of the noise.
     """
 
     rate: float = 30.0
@@ -63,9 +61,7 @@ class RenderedCamera:
         self._start = clock.now()
         self._next = 0
         self._rng = np.random.default_rng(self._timing.seed)
-        self._file: IO[str] | None = None if truth is None else truth.open("w", newline="")
-        if self._file is not None:
-            csv.writer(self._file).writerow(TRUTH_COLUMNS)
+        self._truth = None if truth is None else CsvAppender(truth, TRUTH_COLUMNS)
 
     def read(self) -> Frame | None:
         """The next frame; waits until it would have arrived."""
@@ -76,17 +72,17 @@ class RenderedCamera:
         stage = self._stage
         moments = exposure_times(exposed, stage.look)
         states = [self._world.state(float(moment)) for moment in moments]
-        fault = fault_of(index, stage.look.faults, stage.area, self._timing.seed)
-        image = render(stage, states, self._rng, fault)
+        image = render(stage, states, self._rng)
         stamp = exposed + self._timing.latency
-        self._write_truth(index, stamp, states[len(states) // 2])
+        if self._truth is not None:
+            middle = states[len(states) // 2]
+            self._truth.append([(index, stamp, middle.time, *middle.inclination)])
         return Frame(index, stamp, image)
 
     def close(self) -> None:
         """Close the file of truths."""
-        if self._file is not None:
-            self._file.close()
-            self._file = None
+        if self._truth is not None:
+            self._truth.close()
 
     def _skip_missed(self) -> int:
         """Index of the oldest frame that is not too late."""
@@ -97,10 +93,3 @@ class RenderedCamera:
 
     def _exposed(self, index: int) -> float:
         return self._start + index / self._timing.rate
-
-    def _write_truth(self, index: int, stamp: float, state: WorldState) -> None:
-        if self._file is None:
-            return
-        row = (index, repr(stamp), repr(state.time), *(repr(float(a)) for a in state.inclination))
-        csv.writer(self._file).writerow(row)
-        self._file.flush()

@@ -1,7 +1,6 @@
 """A webcam by OpenCV."""
 
 import time
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,39 +9,26 @@ from ..vision.frame import Frame
 from ..vision.opencv import opencv
 from .base import CameraError, grey
 
-V4L2_MANUAL_EXPOSURE = 1.0
 WARM_UP_FRAMES = 5  # the first ones of many webcams are dark or half a picture
 BUFFERS = 3
 MAX_KEPT = 2 * BUFFERS  # pictures; all that a driver has kept, with some to spare
 MIN_WAIT = 1e-3  # s; a picture that comes sooner was waiting for an unknown time
 
 
-@dataclass(frozen=True)
-class WebcamSettings:
-    """How to run a webcam.
-
-    Attributes:
-        size: Width and height [px].
-        rate: Frames per second.
-        exposure: In the driver's unit, for V4L2 0.1 ms; None leaves it to the camera, which then
-            changes it with the light.
-    """
-
-    size: tuple[int, int] = (640, 480)
-    rate: float = 30.0
-    exposure: float | None = None
-
-
 class Webcam:
     """One webcam, opened by its number or the path of its device."""
 
-    def __init__(self, source: int | str, settings: WebcamSettings | None = None) -> None:
+    def __init__(self, source: int | str, *, size: tuple[int, int], rate: float = 30.0) -> None:
         """Open and set up the camera.
+
+        Args:
+            source: Number of the device, or its path.
+            size: Width and height of the pictures [px].
+            rate: Of them [1/s].
 
         Raises:
             CameraError: it cannot be opened, gives no picture, or gives another size.
         """
-        settings = WebcamSettings() if settings is None else settings
         self._source = source
         self._index = 0
         self._capture = opencv().VideoCapture(source)
@@ -52,8 +38,8 @@ class Webcam:
                     f"camera {source!r} cannot be opened: is it plugged in, may this user read "
                     "it, and does no other program hold it?"
                 )
-            _set_up(self._capture, settings)
-            self._warm_up(settings.size)
+            _set_up(self._capture, size, rate)
+            self._warm_up(size)
         except CameraError:
             self.close()
             raise
@@ -107,15 +93,12 @@ class Webcam:
         self._index = 0
 
 
-def _set_up(capture: Any, settings: WebcamSettings) -> None:
+def _set_up(capture: Any, size: tuple[int, int], rate: float) -> None:
     cv2 = opencv()
     # two raw streams do not fit on one USB 2 bus; the format must be set before the size
     capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*"MJPG"))
-    capture.set(cv2.CAP_PROP_FRAME_WIDTH, settings.size[0])
-    capture.set(cv2.CAP_PROP_FRAME_HEIGHT, settings.size[1])
-    capture.set(cv2.CAP_PROP_FPS, settings.rate)
+    capture.set(cv2.CAP_PROP_FRAME_WIDTH, size[0])
+    capture.set(cv2.CAP_PROP_FRAME_HEIGHT, size[1])
+    capture.set(cv2.CAP_PROP_FPS, rate)
     # with one buffer the driver has none to fill while a picture is measured
     capture.set(cv2.CAP_PROP_BUFFERSIZE, BUFFERS)
-    if settings.exposure is not None:
-        capture.set(cv2.CAP_PROP_AUTO_EXPOSURE, V4L2_MANUAL_EXPOSURE)
-        capture.set(cv2.CAP_PROP_EXPOSURE, settings.exposure)

@@ -5,23 +5,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arm import LOOKAHEAD, WATCHDOG_PERIOD, ArmState, LinkLost, Payload, Six, Tool
+from ..arm import WATCHDOG_PERIOD, ArmState, LinkLost, Payload, Six, Tool
 from ..host_clock import REAL_CLOCK, HostClock
 from ..motion.cup_frame import cup_frame
-from ..motion.kinematics import inverse
 from ..rendering.shared_world import SharedWorld
 from ..rendering.world import WorldState
 from ..rig import Rig
-from ..robot.ur import SERVO_GAIN, STOP_DECELERATION
 from ..safety.guards import NORMAL, PLAYING, RUNNING_MODE
 from ..safety.limits import TargetCheck, workspace
-from .kinematic_arm import REST, KinematicArm
-from .motion import MotionError, joint_speed, servo, twist
-from .replayed_stick import ReplayedStick
+from . import replayed_stick as stick
+from .motion import KinematicArm, MotionError
 from .stick_motion import StickMotion
 
-SERVO_RATE = 15.0  # rad/s2; the real arm's is not published
-PROGRAM_STOP_RATE = 5.0  # rad/s2; of the joints when a program ends in motion
+PROGRAM_STOP_RATE = 5.0  # rad/s2; of the joints when a program ends in motion, or is told to stop
 PROTECTIVE_STOP_RATE = 15.0  # rad/s2
 STOPPED = 1  # runtime_state without a program
 PROTECTIVE_BITS = 1 << 2 | 1 << 10  # protective stopped; stopped due to safety
@@ -80,9 +76,9 @@ class EmulatedArm:
         self._check = TargetCheck(rig, tool)
         self._clock, self._begun = controller.clock, controller.begun
         self._world = controller.world
-        self._stick = None if controller.stir is None else ReplayedStick(controller.stir)
-        self._arm = KinematicArm(space.arm, np.array(controller.joints))
-        self._arm.mount(space.tcp)
+        self._stir = controller.stir
+        self._stick = None if self._stir is None else stick.init(self._stir)
+        self._arm = KinematicArm(space.arm, np.array(controller.joints), space.tcp)
         self._payload = Payload(0.0, (0.0, 0.0, 0.0))
         self._noise = random.Random(controller.seed)
         self._wrench = self._force()
@@ -132,13 +128,11 @@ class EmulatedArm:
 
     def tcp(self) -> Six:
         """Tool's centre in the flange's frame [m, rad]."""
-        return _six(self._arm.mounted.tcp)
+        return _six(self._arm.tcp)
 
     def allows(self, pose: np.ndarray) -> bool:
         """Whether the arm reaches a pose at all; safety planes are not emulated."""
-        mounted = self._arm.mounted
-        found = inverse(mounted.arm, pose, self._arm.state.joints, tcp=mounted.tcp)
-        return found.status != "unreachable"
+        return self._arm.reaches(pose)
 
     def arm_watchdog(self) -> None:
         """From now on the program ends `WATCHDOG_PERIOD` after the last set-point."""
@@ -159,19 +153,17 @@ class EmulatedArm:
         if not self._playing:
             raise LinkLost("the controller's program does not take set-points any more")
         self._previous, self._fed = pose, self._ticks
-        arm = self._arm
         try:
-            target = arm.mounted.joints(pose, arm.state.joints)
-            arm.follow(servo(arm.mounted.arm, target, LOOKAHEAD, SERVO_GAIN, SERVO_RATE))
+            self._arm.follow(pose)
         except MotionError:
             self._protect()
 
     def stop(self) -> None:
-        """Bring the arm to rest on its line; it takes no further command."""
+        """Bring the arm to rest; it takes no further command."""
         self._go_on()
         if self._playing:
-            self._arm.follow(twist(self._arm.mounted, REST, STOP_DECELERATION, ends=True))
-        self._playing, self._stopped = False, True
+            self._end_program(PROGRAM_STOP_RATE)
+        self._stopped = True
 
     def give_up(self) -> None:
         """End the program; there is nothing to wait for."""
@@ -202,8 +194,9 @@ class EmulatedArm:
         except MotionError:
             self._protect()
         self._wrench = self._force()
-        if self._stick is not None:
-            self._stick.advance(self._frame.from_base(self._arm.pose), self._dt)
+        if self._stir is not None and self._stick is not None:
+            pivot = self._frame.from_base(self._arm.pose)[:3]
+            self._stick = stick.advance(self._stir, self._stick, pivot, self._dt)
         self._show()
 
     def _show(self) -> None:
@@ -212,7 +205,9 @@ class EmulatedArm:
             return
         time = self._ticks * self._dt
         pivot = self._frame.from_base(self._arm.pose)[:3]
-        inclination = np.zeros(2) if self._stick is None else np.array(self._stick.angles)
+        inclination = np.zeros(2)
+        if self._stir is not None and self._stick is not None:
+            inclination = np.array(stick.angles(self._stir, self._stick))
         self._world.write(self._begun + time, WorldState(time, pivot, inclination))
 
     def _protect(self) -> None:
@@ -222,7 +217,7 @@ class EmulatedArm:
     def _end_program(self, rate: float) -> None:
         """Take no further set-point; the joints come to rest at a rate [rad/s2]."""
         self._playing = False
-        self._arm.follow(joint_speed(REST, rate, ends=True))
+        self._arm.stop(rate)
 
     def _force(self) -> Six:
         """Noise alone: nothing presses."""

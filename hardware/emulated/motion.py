@@ -1,13 +1,20 @@
-"""Motions of the arm as pure functions of its state."""
+"""An arm without mass: its joints are drawn to set-points, or brought to rest."""
 
 import math
 from collections.abc import Callable
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
 
+from ..arm import LOOKAHEAD
 from ..motion.kinematics import DhArm, forward, inverse, jacobian
-from ..motion.poses import Numbers
+from ..robot.ur import SERVO_GAIN
+
+SERVO_RATE = 15.0  # rad/s2; the real arm's is not published
+TCP_SPEED = 1.5  # m/s, beyond which a controller stops its arm
+RESTING_RATE = 1e-4  # rad/s; under 0.2 mm/s at the TCP
+REST = np.zeros(6)
 
 
 class MotionError(Exception):
@@ -21,144 +28,129 @@ class JointState(NamedTuple):
     speed: np.ndarray
 
 
-class MountedArm(NamedTuple):
-    """The arm and what is mounted on it: `tcp` is the TCP's pose in the flange's frame."""
+class KinematicArm:
+    """The arm and its motion.
 
-    arm: DhArm
-    tcp: np.ndarray
+    Attributes:
+        model: The Denavit-Hartenberg table.
+        tcp: The TCP's pose in the flange's frame [m, rad].
+        state: Joints and their speeds.
+        pose: Of the TCP in the base frame [m, rad].
+        velocity: Of the TCP [m/s, rad/s].
+    """
 
-    def pose(self, joints: Numbers) -> np.ndarray:
-        return forward(self.arm, joints, tcp=self.tcp)
+    def __init__(self, model: DhArm, joints: np.ndarray, tcp: np.ndarray):
+        self.model = model
+        self.state = JointState(np.array(joints, dtype=float), REST)
+        self._servo: Callable[[JointState, float], JointState] | None = None
+        self._brake = 0.0  # rad/s2; positive while the arm comes to rest
+        self.mount(tcp)
 
-    def joints(self, pose: Numbers, near: Numbers) -> np.ndarray:
-        """Joints for a pose.
+    @property
+    def resting(self) -> bool:
+        """Whether no joint moves."""
+        return max(map(abs, self.state.speed.tolist())) < RESTING_RATE
+
+    def mount(self, tcp: np.ndarray) -> None:
+        """Set the TCP's pose in the flange's frame."""
+        self.tcp = np.array(tcp, dtype=float)
+        self._look()
+
+    def reaches(self, pose: np.ndarray) -> bool:
+        """Whether the arm reaches a pose at all."""
+        return inverse(self.model, pose, self.state.joints, tcp=self.tcp) is not None
+
+    def follow(
+        self, pose: np.ndarray, lookahead: float = LOOKAHEAD, gain: float = SERVO_GAIN
+    ) -> None:
+        """Be drawn to a pose from now on, as `servo` says.
 
         Raises:
             MotionError: The pose is not finite or out of reach.
         """
-        found = inverse(self.arm, pose, near, tcp=self.tcp)
-        if found.status == "unreachable":
+        found = inverse(self.model, pose, self.state.joints, tcp=self.tcp)
+        if found is None:
             raise MotionError(f"no joints for pose {np.round(pose, 4).tolist()}")
-        return found.joints
+        self._brake = 0.0
+        self._servo = partial(
+            servo,
+            target=found,
+            lookahead=lookahead,
+            gain=gain,
+            fastest=np.array(self.model.joint_speed),
+        )
 
-    def jacobian(self, joints: Numbers) -> np.ndarray:
-        return jacobian(self.arm, joints, tcp=self.tcp)
+    def stop(self, rate: float) -> None:
+        """Come to rest from now on; all joints together, the fastest at a rate [rad/s2]."""
+        self._servo, self._brake = None, rate
+
+    def tick(self, dt: float) -> None:
+        """Go on for dt [s].
+
+        Raises:
+            MotionError: The TCP is too fast; the caller stops the arm.
+        """
+        if self._servo is not None:
+            self.state = self._servo(self.state, dt)
+        elif self._brake and self.state.speed.any():
+            self.state = braked(self.state, dt, self._brake)
+        else:
+            return
+        self._look()
+        if self._servo is not None and math.hypot(*self.velocity[:3]) > TCP_SPEED:
+            raise MotionError(f"the TCP is faster than {TCP_SPEED} m/s")
+
+    def _look(self) -> None:
+        joints, speed = self.state
+        self.pose = forward(self.model, joints, tcp=self.tcp)
+        moving = speed.any()
+        self.velocity = jacobian(self.model, joints, tcp=self.tcp) @ speed if moving else REST
 
 
-Step = Callable[[JointState, float], JointState]
-
-
-class Motion(NamedTuple):
-    """A motion that follows from the state: `step(state, dt)`.
-
-    With `ends` it is over as soon as the arm rests.
-    """
-
-    step: Step
-    ends: bool = False
-
-
-def check_numbers(**values: Numbers | float) -> None:
-    for name, value in values.items():
-        if not np.isfinite(value).all():
-            raise MotionError(f"{name} {value} is not finite")
-
-
-def servo(arm: DhArm, target: np.ndarray, lookahead: float, gain: float, limit: float) -> Motion:
-    """servoJ: the joints are drawn to `target` by gain * (target - joints - lookahead * speed).
+def servo(
+    state: JointState,
+    dt: float,
+    *,
+    target: np.ndarray,
+    lookahead: float,
+    gain: float,
+    fastest: np.ndarray,
+) -> JointState:
+    """One tick in which joints are drawn by gain * (target - joints - lookahead * speed).
 
     This has what the manual tells of both numbers: the arm lags a moving target by `lookahead`
     [s], a smaller one reacts faster, a larger one overshoots less, and `gain` [1/s2] stiffens.
-    The real filter is not published. Speeds are clipped to the joints' own, accelerations to
-    `limit` [rad/s2].
+    The real filter is not published. Speeds are clipped to `fastest` [rad/s], accelerations to
+    `SERVO_RATE`.
     """
-    check_numbers(target=target, lookahead=lookahead, gain=gain)
-    if np.abs(target).max() > arm.joint_limit:
-        raise MotionError(f"joints {np.round(target, 3).tolist()} are beyond the joint limits")
-    fastest = np.array(arm.joint_speed)
-
-    def step(state: JointState, dt: float) -> JointState:
-        stay, push, swing, keep = oscillator(gain, gain * lookahead, dt)
-        away = state.joints - target
-        wanted = swing * away + keep * state.speed
-        change = np.clip(wanted - state.speed, -limit * dt, limit * dt)
-        speed = np.clip(state.speed + change, -fastest, fastest)
-        if np.array_equal(speed, wanted):
-            joints = target + stay * away + push * state.speed
-        else:
-            joints = state.joints + 0.5 * dt * (state.speed + speed)
-        if np.abs(joints - target).max() < 1e-8 and np.abs(speed).max() < 1e-6:
-            return JointState(target, np.zeros(6))
-        return JointState(joints, speed)
-
-    return Motion(step)
+    stay, push, swing, keep = oscillator(gain, gain * lookahead, dt)
+    away = state.joints - target
+    wanted = swing * away + keep * state.speed
+    change = np.clip(wanted - state.speed, -SERVO_RATE * dt, SERVO_RATE * dt)
+    speed = np.clip(state.speed + change, -fastest, fastest)
+    if np.array_equal(speed, wanted):
+        joints = target + stay * away + push * state.speed
+    else:
+        joints = state.joints + 0.5 * dt * (state.speed + speed)
+    if np.abs(joints - target).max() < 1e-8 and np.abs(speed).max() < 1e-6:
+        return JointState(target, REST)
+    return JointState(joints, speed)
 
 
-_CACHE: dict[tuple[float, float, float], tuple[float, float, float, float]] = {}
+def braked(state: JointState, dt: float, rate: float) -> JointState:
+    """One tick in which all joints slow down together, the fastest at a rate [rad/s2]."""
+    fastest = np.abs(state.speed).max()
+    speed = state.speed * max(1.0 - rate * dt / fastest, 0.0)
+    return JointState(state.joints + 0.5 * dt * (state.speed + speed), speed)
 
 
+@lru_cache(100)
 def oscillator(stiffness: float, damping: float, dt: float) -> tuple[float, float, float, float]:
     """exp(A dt) of x'' = -stiffness x - damping x', row by row: exact at any step."""
-    key = (stiffness, damping, dt)
-    if key not in _CACHE:
-        if len(_CACHE) > 100:
-            _CACHE.clear()
-        values, vectors = np.linalg.eig(np.array([[0.0, 1.0], [-stiffness, -damping]]) + 0j)
-        # two equal roots leave no basis of eigenvectors; a shift of 1e-6 of one does not show
-        if abs(values[0] - values[1]) < 1e-6 * abs(values[0]):
-            return oscillator(stiffness * (1.0 + 1e-6), damping, dt)
-        exact = (vectors * np.exp(values * dt)) @ np.linalg.inv(vectors)
-        (a, b), (c, d) = exact.real.tolist()
-        _CACHE[key] = (a, b, c, d)
-    return _CACHE[key]
-
-
-def joint_speed(target: np.ndarray, rate: float, *, ends: bool = False) -> Motion:
-    """speedJ, and stopJ with target zero: all speeds reach the target together, at `rate`."""
-    check_numbers(speed=target, acceleration=rate)
-    if rate <= 0.0:
-        raise MotionError(f"acceleration {rate} must be positive")
-
-    def step(state: JointState, dt: float) -> JointState:
-        speed = approached(state.speed, target, rate * dt, largest=True)
-        return JointState(state.joints + 0.5 * dt * (state.speed + speed), speed)
-
-    return Motion(step, ends)
-
-
-def twist(mounted: MountedArm, target: np.ndarray, rate: float, *, ends: bool = False) -> Motion:
-    """speedL, and stopL with target zero: TCP velocity [m/s, rad/s] approaches the target.
-
-    `rate` bounds the change of the velocity [m/s2] and that of the turning [rad/s2].
-    """
-    check_numbers(speed=target, acceleration=rate)
-    if rate <= 0.0:
-        raise MotionError(f"acceleration {rate} must be positive")
-
-    def step(state: JointState, dt: float) -> JointState:
-        moving = mounted.jacobian(state.joints) @ state.speed
-        next_twist = np.concatenate(
-            [
-                approached(moving[:3], target[:3], rate * dt),
-                approached(moving[3:], target[3:], rate * dt),
-            ]
-        )
-        if not next_twist.any():
-            return JointState(state.joints + 0.5 * dt * state.speed, np.zeros(6))
-        ahead = state.joints + dt * state.speed
-        try:
-            speed = np.linalg.solve(mounted.jacobian(ahead), next_twist)
-        except np.linalg.LinAlgError as err:
-            raise MotionError("the arm is in a singular configuration") from err
-        return JointState(state.joints + 0.5 * dt * (state.speed + speed), speed)
-
-    return Motion(step, ends)
-
-
-def approached(
-    value: np.ndarray, target: np.ndarray, most: float, *, largest: bool = False
-) -> np.ndarray:
-    """`value` moved straight towards `target`, by `most` in length (or in its largest part)."""
-    way = target - value
-    length = np.abs(way).max() if largest else math.sqrt(float(way @ way))
-    return target if length <= most else value + way * (most / length)
+    values, vectors = np.linalg.eig(np.array([[0.0, 1.0], [-stiffness, -damping]]) + 0j)
+    # two equal roots leave no basis of eigenvectors; a shift of 1e-6 of one does not show
+    if abs(values[0] - values[1]) < 1e-6 * abs(values[0]):
+        return oscillator(stiffness * (1.0 + 1e-6), damping, dt)
+    exact = (vectors * np.exp(values * dt)) @ np.linalg.inv(vectors)
+    (a, b), (c, d) = exact.real.tolist()
+    return a, b, c, d

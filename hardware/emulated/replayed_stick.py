@@ -131,20 +131,3 @@ def _foot(point: Sequence[float], start: Sequence[float], end: Sequence[float]) 
     length = sum(w * w for w in way)
     share = min(max(along / length, 0.0), 1.0) if length > 0.0 else 0.0
     return [a + share * w for a, w in zip(start, way, strict=True)]
-
-
-class ReplayedStick:
-    """The stick of one arm."""
-
-    def __init__(self, motion: StickMotion):
-        self._motion = motion
-        self._state = init(motion)
-
-    @property
-    def angles(self) -> tuple[float, float]:
-        """Inclination in the xz and yz planes of the table's frame [rad]."""
-        return angles(self._motion, self._state)
-
-    def advance(self, pose: Numbers, dt: float) -> None:
-        """Advance by dt [s] to a TCP pose in the table's frame."""
-        self._state = advance(self._motion, self._state, pose[:3], dt)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -33,7 +34,7 @@ class HiddenLiquid:
 
     Attributes:
         viscosity: Dynamic [Pa s].
-        seed: Of the pictures' noise and faults, and of the liquid's particles.
+        seed: Of the pictures' noise, and of the liquid's particles.
         stir: How the stick hangs while the liquid is stirred, in the cup's frame; None where
             nobody has simulated that: the stick hangs straight down.
     """
@@ -96,7 +97,7 @@ def emulated(
     stir = None if liquid.stir is None else checked(liquid.stir)
     world = SharedWorld(begun, WorldState(0.0, pose[:3], np.zeros(2)))
     cameras: dict[View, Callable[[], FrameSource]] = {
-        view: RenderedView(rig, view, world, liquid.seed, truth) for view in _SEEDS
+        view: partial(rendered_camera, rig, view, world, liquid.seed, truth) for view in _SEEDS
     }
     return EmulatedRig(
         EmulatedController(joints, begun, tool, liquid.seed, stir, world),
@@ -105,32 +106,27 @@ def emulated(
     )
 
 
-class RenderedView(NamedTuple):
-    """Opens the rendered camera of one view; can be sent to another process."""
-
-    rig: Rig
-    view: View
-    world: SharedWorld
-    seed: int
-    truth: Path | None
-
-    def __call__(self) -> FrameSource:
-        rig, camera = self.rig, self.rig.camera(self.view)
-        scene = Scene(
-            marker_offset=camera.marker,
-            cup_radius=rig.cup.radius,
-            cup_height=rig.cup.height,
-            fill=rig.cup.fill,
-            stick_radius=rig.stick.radius,
-            stick_length=rig.stick.length,
-            marker_radius=camera.marker_radius,
-        )
-        look = Look() if rig.stick.colour == "dark" else BRIGHT_STICK
-        seed = 10 * self.seed + _SEEDS[self.view]
-        stage = prepare(scene, camera_model(camera), look, seed)
-        timing = Timing(rate=camera.rate, seed=seed)
-        truth = None if self.truth is None else self.truth / truth_file(self.view)
-        return RenderedCamera(stage, self.world, timing, truth=truth)
+def rendered_camera(
+    rig: Rig, view: View, world: SharedWorld, seed: int, truth: Path | None
+) -> RenderedCamera:
+    """Open the rendered camera of one view, in the process that reads it."""
+    camera = rig.camera(view)
+    scene = Scene(
+        marker_offset=camera.marker,
+        cup_radius=rig.cup.radius,
+        cup_height=rig.cup.height,
+        fill=rig.cup.fill,
+        stick_radius=rig.stick.radius,
+        stick_length=rig.stick.length,
+        marker_radius=camera.marker_radius,
+    )
+    look = Look() if rig.stick.colour == "dark" else BRIGHT_STICK
+    seed = 10 * seed + _SEEDS[view]
+    stage = prepare(scene, camera_model(camera), look, seed)
+    timing = Timing(rate=camera.rate, seed=seed)
+    return RenderedCamera(
+        stage, world, timing, truth=None if truth is None else truth / truth_file(view)
+    )
 
 
 def patient(rig: Rig) -> Rig:
@@ -145,10 +141,10 @@ def patient(rig: Rig) -> Rig:
 def _joints(rig: Rig, pose: np.ndarray, tool: Tool) -> tuple[float, ...]:
     space = workspace(rig, tool)
     found = inverse(space.arm, cup_frame(rig.cup).to_base(pose), space.start, tcp=space.tcp)
-    if found.status == "unreachable":
+    if found is None:
         raise RigError(
             f"the arm does not reach {np.round(pose, 3).tolist()} of the cup's frame",
             where="rig.toml: cup.position",
             fix="place the cup nearer to the robot",
         )
-    return tuple(found.joints.tolist())
+    return tuple(found.tolist())

@@ -65,19 +65,7 @@ UR10E = DhArm(
     joint_limit=2.0 * math.pi,
     joint_speed=_SPEEDS,
 )
-ARMS = {"ur10": UR10, "ur10e": UR10E}
-
-
-class Inverse(NamedTuple):
-    """Joints [rad], shape [6], for a pose.
-
-    `status` is "ok"; or "singular": the joints are exact, but the wrist's axes 4 and 6 coincide
-    there, so that only their sum is determined and joint 6 was kept; or "unreachable": no
-    solution within the joint limits, or a pose that is not finite; the joints are NaN.
-    """
-
-    joints: np.ndarray
-    status: Literal["ok", "singular", "unreachable"]
+ARMS = {"cb3": UR10, "e-series": UR10E}
 
 
 class JointPath(NamedTuple):
@@ -108,14 +96,9 @@ def forward(arm: DhArm, joints: Numbers, *, tcp: Numbers | None = None) -> np.nd
         joints: Joint angles [rad], shape [6].
         tcp: Pose of the TCP in the flange's frame; the flange itself if None.
     """
-    return matrix_pose(forward_matrix(arm, joints, tcp=tcp))
-
-
-def forward_matrix(arm: DhArm, joints: Numbers, *, tcp: Numbers | None = None) -> np.ndarray:
-    """The same as `forward`, as a homogeneous transform, shape [4, 4]."""
     flange = np.eye(4)
     flange[:3] = np.array(_frames(arm, joints)[-1]).T
-    return flange if tcp is None else flange @ pose_matrix(tcp)
+    return matrix_pose(flange if tcp is None else flange @ pose_matrix(tcp))
 
 
 def _frames(arm: DhArm, joints: Numbers) -> list[_Frame]:
@@ -165,34 +148,40 @@ def jacobian(arm: DhArm, joints: Numbers, *, tcp: Numbers | None = None) -> np.n
     return np.array(columns).T
 
 
-def inverse(arm: DhArm, pose: Numbers, near: Numbers, *, tcp: Numbers | None = None) -> Inverse:
+def inverse(
+    arm: DhArm, pose: Numbers, near: Numbers, *, tcp: Numbers | None = None
+) -> np.ndarray | None:
     """Joints that put the TCP at a pose: of the up to eight solutions the one nearest to `near`.
 
     Closed form for the UR family (as in Hawkins, "Analytic inverse kinematics for the universal
     robots", 2013), exact to rounding also near singular configurations. Each joint is taken on
-    the turn that is nearest to `near` within the arm's limits.
+    the turn that is nearest to `near` within the arm's limits. Where the wrist's axes 4 and 6
+    coincide, so that only their sum is determined, joint 6 is kept.
 
     Args:
         arm: The Denavit-Hartenberg table.
         pose: TCP in the base frame: position [m], rotation vector [rad].
         near: Joints [rad] from which the arm comes, shape [6].
         tcp: As for `forward`.
+
+    Returns:
+        Joints [rad], shape [6]; None if none within the joint limits reach the pose, or it is not
+        finite.
     """
     target = pose_matrix(pose)
     if not np.isfinite(target).all():
-        return Inverse(np.full(6, np.nan), "unreachable")
+        return None
     if tcp is not None:
         target = target @ _inverse_transform(pose_matrix(tcp))
     start = [float(value) for value in near]
-    best, best_distance, best_singular = None, math.inf, False
-    for solution, singular in _solutions(arm, target, start[5]):
-        turned = _nearest_turn(solution, start, arm.joint_limit)
-        distance = sum((x - y) ** 2 for x, y in zip(turned, start, strict=True))
-        if distance < best_distance:
-            best, best_distance, best_singular = turned, distance, singular
-    if best is None:
-        return Inverse(np.full(6, np.nan), "unreachable")
-    return Inverse(np.array(best), "singular" if best_singular else "ok")
+    solutions = _solutions(arm, target, start[5])
+    turned = [_nearest_turn(solution, start, arm.joint_limit) for solution in solutions]
+    nearest = min(
+        turned,
+        key=lambda joints: sum((x - y) ** 2 for x, y in zip(joints, start, strict=True)),
+        default=None,
+    )
+    return None if nearest is None else np.array(nearest)
 
 
 def _inverse_transform(matrix: np.ndarray) -> np.ndarray:
@@ -215,8 +204,8 @@ def _nearest_turn(joints: Sequence[float], near: Sequence[float], limit: float) 
     return turned
 
 
-def _solutions(arm: DhArm, flange: np.ndarray, kept: float) -> list[tuple[tuple[float, ...], bool]]:
-    """All joints for a flange, each with whether its wrist is singular; joint 6 is then `kept`."""
+def _solutions(arm: DhArm, flange: np.ndarray, kept: float) -> list[tuple[float, ...]]:
+    """All joints for a flange; joint 6 is `kept` where the wrist is singular."""
     (xx, yx, zx, px), (xy, yy, zy, py), (xz, yz, zz, pz) = flange[:3].tolist()
     # centre of the wrist; its distance from the plane of the three parallel axes is d4
     cx, cy, cz = px - arm.d[5] * zx, py - arm.d[5] * zy, pz - arm.d[5] * zz
@@ -243,7 +232,7 @@ def _solutions(arm: DhArm, flange: np.ndarray, kept: float) -> list[tuple[tuple[
             along += s1 * (cy + arm.d[4] * (s6 * xy + c6 * yy))
             up = cz + arm.d[4] * (s6 * xz + c6 * yz) - arm.d[0]
             for two, three in _elbow(arm.a[1], arm.a[2], along, up):
-                found.append(((one, two, three, turned - two - three, five, six), singular))
+                found.append((one, two, three, turned - two - three, five, six))
     return found
 
 
@@ -296,11 +285,11 @@ def follow(
     near = np.asarray(start, dtype=float)
     reached = len(poses)
     for k, pose in enumerate(poses):
-        joints[k] = inverse(arm, pose, near, tcp=tcp).joints
-        if np.isnan(joints[k, 0]):
+        found = inverse(arm, pose, near, tcp=tcp)
+        if found is None:
             reached = k
             break
-        near = joints[k]
+        joints[k] = near = found
     done = joints[:reached]
     steps = np.abs(np.diff(np.vstack([np.asarray(start, dtype=float), done]), axis=0)).max(axis=1)
     step = float(steps.max(initial=0.0))

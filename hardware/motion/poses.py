@@ -84,14 +84,3 @@ def pose_matrix(pose: Numbers) -> np.ndarray:
 def matrix_pose(matrix: np.ndarray) -> np.ndarray:
     """The pose, shape [6], of a homogeneous transform."""
     return np.concatenate([matrix[:3, 3], rotation_vector(matrix)])
-
-
-def compose(first: Numbers, second: Numbers) -> np.ndarray:
-    """Pose `second`, given in the frame of pose `first`, in the frame of `first`'s parent."""
-    return matrix_pose(pose_matrix(first) @ pose_matrix(second))
-
-
-def inverse(pose: Numbers) -> np.ndarray:
-    """The pose that undoes `pose`: `compose(pose, inverse(pose))` is zero."""
-    rotation = rotation_matrix(pose[3:6])
-    return np.concatenate([-rotation.T @ np.asarray(pose[:3]), -np.asarray(pose[3:6])])

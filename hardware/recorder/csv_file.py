@@ -12,17 +12,16 @@ from .background_sync import BackgroundSync
 
 
 class CsvAppender:
-    """Appends rows to a table; whatever was appended outlives this process.
+    """Appends rows to a new table; whatever was appended outlives this process.
 
     The rows of one call go to the file by one `write`. A loss of power costs what came in the
     last second, as `BackgroundSync` says.
     """
 
     def __init__(self, path: Path, fields: Sequence[str]):
-        self._file = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
+        self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
         try:
-            if _drop_cut_row(self._file) == 0:
-                write_all(self._file, (",".join(fields) + "\n").encode())
+            write_all(self._file, (",".join(fields) + "\n").encode())
         except OSError:
             os.close(self._file)
             raise
@@ -73,16 +72,6 @@ def _line(row: Sequence[float]) -> str:
 def _number(value: Any) -> str:
     # float's text gives the same double back; NumPy's own would name its type
     return str(int(value)) if isinstance(value, int | np.integer) else repr(float(value))
-
-
-def _drop_cut_row(file: int) -> int:
-    """Cut the file behind its last whole row, and return the length that is left [bytes]."""
-    size = os.fstat(file).st_size
-    tail = os.pread(file, min(size, 65_536), max(size - 65_536, 0))
-    whole = size - len(tail) + tail.rfind(b"\n") + 1
-    if whole < size:
-        os.ftruncate(file, whole)
-    return whole
 
 
 def read_csv(path: Path, fields: Sequence[str]) -> dict[str, NDArray[np.float64]]:

@@ -21,19 +21,21 @@ class Disk:
         self.slowest = 0.0
         self._log = log
 
-    def write(self, name: str, act: Callable[[], Any]) -> None:
-        """Call `act`, which writes to the file `name`, unless an earlier write has failed."""
+    def write[T](self, name: str, act: Callable[[], T]) -> T | None:
+        """What `act` returns, which writes to the file `name`; None once a write has failed."""
         if self.trouble is Trouble.WRITE_FAILED:
-            return
+            return None
         start = host_time()
         try:
-            act()
+            return act()
         except OSError as err:
             self.trouble = Trouble.WRITE_FAILED
             cure = " (make room)" if err.errno in FULL else ""
             reason = f"{name}: {err.strerror or err}{cure}"
             self.tell(self.trouble.kind, file=name, reason=reason)
-        self.slowest = max(self.slowest, host_time() - start)
+        finally:
+            self.slowest = max(self.slowest, host_time() - start)
+        return None
 
     def tell(self, kind: str, **fields: Any) -> None:
         """Write an event, if it can be written at all; the board tells of trouble besides."""

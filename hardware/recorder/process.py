@@ -1,17 +1,17 @@
 """The recorder: a process that does nothing but write down the robot's samples."""
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from contextlib import closing
+from functools import partial
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any
 
 from ..board import Board, Row, Who, host_time
 from ..signals import leave_signals_to_main
 from .csv_file import CsvAppender
 from .disk import Disk, told_if_fails
 from .events import EventLog
-from .rate import Rate, counted, no_rate
+from .rate import counted, no_rate
 from .sample import SAMPLES, Sample
 
 HEARTBEAT = 0.04  # [s], at the longest, from one sign of life to the next
@@ -36,72 +36,45 @@ def run_recorder(board: Board, samples: Connection, main: Connection, directory:
     """
     leave_signals_to_main()
     with closing(EventLog(directory, "recorder")) as log, told_if_fails(disk := Disk(log)):
-        recorder = _Recorder(board, disk, directory)
-        recorder.follow(samples, main)
-        recorder.finish()
-        disk.tell("left", rows=recorder.rate.total, slowest_write=disk.slowest)
-
-
-class _Recorder:
-    def __init__(self, board: Board, disk: Disk, directory: Path):
-        self.rate: Rate = no_rate(host_time())
-        self._board = board
-        self._disk = disk
-        self._table: CsvAppender | None = None
-        self._write(lambda: self._open(directory))
-
-    def follow(self, samples: Connection, main: Connection) -> None:
-        """Record until main lets go, and then until the arm's last sample."""
-        ends = [samples, main]
-        deadline = float("inf")
-        while host_time() < deadline and ends:
-            for end in wait(ends, timeout=min(HEARTBEAT, max(deadline - host_time(), 0.0))):
-                if end is samples and self._record(samples):
-                    continue
-                ends.remove(end)  # type: ignore[arg-type]
-                if end is main:
-                    deadline = host_time() + LAST_SAMPLES
-                else:
-                    self._disk.tell("samples_ended", rows=self.rate.total)
-            if deadline < float("inf") and samples not in ends:
-                return
-            self._beat()
-
-    def finish(self) -> None:
-        """Bring everything to the disk."""
-        table = self._table
+        table = disk.write(SAMPLES, lambda: CsvAppender(directory / SAMPLES, Sample._fields))
+        rate = no_rate(host_time())
+        for rows in _arriving(samples, main, disk):
+            if table is not None and rows:
+                disk.write(SAMPLES, partial(table.append, rows))
+            now = host_time()
+            rate = counted(rate, len(rows), now)
+            row = Row(now, disk.trouble, rate.total, rate.rate, worst=disk.slowest)
+            board.write(Who.RECORDER, row)
         if table is not None:
-            self._write(table.sync)
+            disk.write(SAMPLES, table.sync)
             table.close()
+        disk.tell("left", rows=rate.total, slowest_write=disk.slowest)
 
-    def _open(self, directory: Path) -> None:
-        self._table = CsvAppender(directory / SAMPLES, Sample._fields)
 
-    def _record(self, samples: Connection) -> bool:
-        """Write all that has come; false when no more will."""
+def _arriving(samples: Connection, main: Connection, disk: Disk) -> Iterator[list[Sample]]:
+    """What comes within each heartbeat, until main lets go and the arm has sent its last sample."""
+    ends = [samples, main]
+    deadline = float("inf")
+    while host_time() < deadline and ends:
         rows: list[Sample] = []
-        more = _received(samples, rows.extend)
-        table = self._table
-        if table is not None and rows:
-            self._write(lambda: table.append(rows))
-        self.rate = counted(self.rate, len(rows), host_time())
-        return more
-
-    def _write(self, act: Callable[[], Any]) -> None:
-        self._disk.write(SAMPLES, act)
-
-    def _beat(self) -> None:
-        now = host_time()
-        self.rate = counted(self.rate, 0, now)
-        row = Row(now, self._disk.trouble, self.rate.total, self.rate.rate)
-        self._board.write(Who.RECORDER, row._replace(worst=self._disk.slowest))
+        for end in wait(ends, timeout=min(HEARTBEAT, max(deadline - host_time(), 0.0))):
+            if end is samples and _received(samples, rows):
+                continue
+            ends.remove(end)  # type: ignore[arg-type]
+            if end is main:
+                deadline = host_time() + LAST_SAMPLES
+            else:
+                disk.tell("samples_ended")
+        yield rows
+        if deadline < float("inf") and samples not in ends:
+            return
 
 
-def _received(samples: Connection, take: Callable[[list[Sample]], None]) -> bool:
-    """Take what is waiting, within reason; false when the sender has gone."""
+def _received(samples: Connection, rows: list[Sample]) -> bool:
+    """Add what is waiting to `rows`, within reason; false when the sender has gone."""
     try:
         for _ in range(100):  # a flood must not keep the recorder from its signs of life
-            take(samples.recv())
+            rows.extend(samples.recv())
             if not samples.poll():
                 break
     except (EOFError, OSError):  # OSError: it was killed in the middle of a message

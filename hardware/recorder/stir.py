@@ -9,9 +9,7 @@ from ..errors import RigError
 from ..motion.trajectory import Trajectory
 from ..rig import View
 from ..vision.delay import Delay, DelayError, fit_delay
-from ..vision.frame_measurement import BAD_LINE
-from ..vision.joined_views import MeasuredView, join
-from ..vision.measurement_series import FrameSeries, frame_series
+from ..vision.inclination import FrameSeries, MeasuredView, frame_series, join
 from .directory import VIEWS
 from .raw import Columns, Raw
 
@@ -68,7 +66,7 @@ def extract_stir(raw: Raw, where: str, until: float = np.inf) -> Stir:
     span = _stirred(raw.samples, where, until)
     _check_length(span, where)
     series = {view: frame_series(raw.frames[view]) for view in VIEWS}
-    delays: dict[View, Delay] = {view: _delay(raw, view, span) for view in VIEWS}
+    delays: dict[View, Delay] = {view: _delay(raw, view, span, series[view]) for view in VIEWS}
     for view in VIEWS:
         span = _seen(span, series[view], delays[view].delay, f"view {view}", raw.faults[view])
     _check_length(span, where)
@@ -126,7 +124,7 @@ def _way_near(samples: Columns, span: Span) -> Trajectory:
     return Trajectory(samples["time"][near], path)
 
 
-def _delay(raw: Raw, view: View, span: Span) -> Delay:
+def _delay(raw: Raw, view: View, span: Span, series: FrameSeries) -> Delay:
     """Delay of a camera.
 
     Raises:
@@ -135,7 +133,7 @@ def _delay(raw: Raw, view: View, span: Span) -> Delay:
     fault = raw.faults[view]
     try:
         return fit_delay(
-            frame_series(raw.frames[view]),
+            series,
             _way_near(raw.samples, span),
             raw.provenance.cameras[view],
             raw.provenance.rig.camera(view).marker,
@@ -150,8 +148,7 @@ def _delay(raw: Raw, view: View, span: Span) -> Delay:
 
 def _seen(span: Span, series: FrameSeries, delay: float, where: str, fault: str) -> Span:
     """The part of the span in which a view has seen the stick, up to `LONGEST_GAP` at its ends."""
-    good = ((series.flags & int(BAD_LINE)) == 0) & np.isfinite(series.lines.angle)
-    time = series.stamp[good] - delay
+    time = series.stamp[series.lines.good] - delay
     time = time[(time >= span.first) & (time <= span.last)]
     if len(time) == 0:
         raise RigError(

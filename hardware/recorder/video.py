@@ -17,7 +17,6 @@ from .csv_file import write_all
 
 _TICK = Fraction(1, 1000)  # Matroska's own unit of time [s]
 _QUALITY = 2  # MJPEG's best: blocks of a coarser one move a line's edge
-_NO_COLOUR = 128
 
 
 class VideoWriter:
@@ -54,7 +53,6 @@ class VideoWriter:
         coder.qmin = coder.qmax = _QUALITY
         coder.thread_count = 1  # threads would keep pictures back
         self._stream = stream
-        self._picture: Any = _grey_picture(width, height)
         self._shape = (height, width)
         self._first: float | None = None
         self._last = -1
@@ -71,6 +69,8 @@ class VideoWriter:
             OSError: The file cannot take it.
             ValueError: The picture has another shape or type.
         """
+        from av import VideoFrame
+
         if image.shape != self._shape or image.dtype != np.uint8:
             raise ValueError(
                 f"a picture has shape {image.shape} and type {image.dtype}, the video "
@@ -81,10 +81,10 @@ class VideoWriter:
         if math.isfinite(stamp):
             self._first = stamp if self._first is None else self._first
             self._last = max(self._last, round((stamp - self._first) / _TICK))
-        _fill(self._picture.planes[0], image)
-        self._picture.pts, self._picture.time_base = self._last, _TICK
+        picture: Any = VideoFrame.from_ndarray(image, format="gray")
+        picture.pts, picture.time_base = self._last, _TICK
         with _os_errors():
-            self._mux(self._picture)
+            self._mux(picture)
         self._sync.check()
 
     def close(self) -> None:
@@ -125,21 +125,3 @@ class _WholeWrites(io.FileIO):
     def write(self, data: Any, /) -> int:
         write_all(self.fileno(), data)
         return len(data)
-
-
-def _grey_picture(width: int, height: int) -> Any:
-    import av
-
-    picture = av.VideoFrame(width, height, "yuvj420p")
-    for plane in picture.planes[1:]:
-        plane.update(bytes([_NO_COLOUR]) * plane.buffer_size)
-    return picture
-
-
-def _fill(plane: Any, image: np.ndarray) -> None:
-    # a plane's lines may be longer than the picture is wide
-    if plane.line_size == image.shape[1]:
-        plane.update(np.ascontiguousarray(image))
-        return
-    lines = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)
-    lines[: image.shape[0], : image.shape[1]] = image

@@ -1,14 +1,12 @@
 """Synthetic pictures of the stirring scene, for rehearsals and as the truth of tests."""
 
 from .drawing import Stage, exposure_times, prepare, render
-from .faults import Fault, fault_of
 from .scene import BRIGHT_STICK, Look, Scene
 from .shared_world import SharedWorld
 from .world import World, WorldState, direction
 
 __all__ = [
     "BRIGHT_STICK",
-    "Fault",
     "Look",
     "Scene",
     "SharedWorld",
@@ -17,7 +15,6 @@ __all__ = [
     "WorldState",
     "direction",
     "exposure_times",
-    "fault_of",
     "prepare",
     "render",
 ]

@@ -7,10 +7,10 @@ import numpy as np
 
 from ..vision.camera_model import CameraModel
 from ..vision.opencv import opencv
-from .coverage import PixelWindow, bar_coverage, blend, disc_coverage, window_around
-from .faults import Fault, PixelNoise, draw_fault, noise_pool
+from .coverage import bar_coverage, blend, disc_coverage, window_around
+from .noise import PixelNoise, noise_pool
 from .scene import Look, Scene, circle
-from .stick_shape import bar_sides, submerged_outline, surface_share
+from .stick_shape import bar_sides, surface_share
 from .world import WorldState
 
 SUBPIXEL_BITS = 4  # OpenCV draws at sixteenths of a pixel
@@ -27,9 +27,7 @@ class Stage:
         look: Of the picture.
         backdrop: The picture without gripper and stick.
         glass: Lines of the cup in front of the stick, each pixels of shape (N, 2).
-        liquid: Where the liquid is seen through the wall, uint8, 255 or 0.
         noise: To be added.
-        area: Where the stick may be.
     """
 
     scene: Scene
@@ -37,54 +35,48 @@ class Stage:
     look: Look
     backdrop: np.ndarray
     glass: tuple[np.ndarray, ...]
-    liquid: np.ndarray
     noise: PixelNoise
-    area: PixelWindow
 
 
 def prepare(scene: Scene, camera: CameraModel, look: Look, seed: int = 0) -> Stage:
     """Draw what stands still and make ready what every frame needs."""
     backdrop = _background(camera.size, look, np.random.default_rng(seed))
-    liquid = _liquid_mask(scene, camera)
-    backdrop[liquid > 0] = np.uint8(look.liquid)
+    if scene.fill > 0:
+        _draw_liquid(backdrop, scene, camera, look)
     glass = _glass_lines(scene, camera)
     _draw_lines(backdrop, _back_lines(scene, camera), look.glass)
-    reach = scene.cup_radius * 1.2
-    corners = [[x, y, z] for x in (-reach, reach) for y in (-reach, reach) for z in (0.03, 0.26)]
-    area = window_around(camera.project(np.array(corners)), camera.size)
     noise = noise_pool(camera.size, look.read_noise, look.shot_noise, seed + 1)
-    return Stage(scene, camera, look, backdrop, glass, liquid, noise, area)
+    return Stage(scene, camera, look, backdrop, glass, noise)
 
 
-def render(
-    stage: Stage,
-    exposures: Sequence[WorldState],
-    rng: np.random.Generator,
-    fault: Fault | None = None,
-) -> np.ndarray:
-    """One picture.
+def render(stage: Stage, exposures: Sequence[WorldState], rng: np.random.Generator) -> np.ndarray:
+    """One picture: `draw`, then `develop`."""
+    return develop(stage, draw(stage, exposures), rng)
+
+
+def draw(stage: Stage, exposures: Sequence[WorldState]) -> np.ndarray:
+    """What a perfect camera would see; the stick ends at the liquid's surface.
 
     Args:
         stage: What `prepare` made.
         exposures: The scene at equally spaced moments of the exposure; see `exposure_times`.
-        rng: For the noise.
-        fault: Something that is in the way.
 
     Returns:
         Grey levels, uint8, shape (height, width).
     """
-    cv2, look = opencv(), stage.look
     image = stage.backdrop.copy()
-    middle = exposures[len(exposures) // 2]
-    _draw_submerged(image, stage, middle)
     _draw_stick(image, stage, exposures)
-    _draw_lines(image, stage.glass, look.glass)
-    _draw_gripper(image, stage, middle)
+    _draw_lines(image, stage.glass, stage.look.glass)
+    _draw_gripper(image, stage, exposures[len(exposures) // 2])
     _draw_marker(image, stage, exposures)
-    if fault is not None:
-        draw_fault(image, fault)
+    return image
+
+
+def develop(stage: Stage, image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """A drawn picture with the lens's blur and the sensor's noise."""
+    look = stage.look
     if look.defocus > 0:
-        image = cv2.GaussianBlur(image, (5, 5), look.defocus)
+        image = opencv().GaussianBlur(image, (5, 5), look.defocus)
     return stage.noise.add(image, rng) if look.read_noise > 0 else image
 
 
@@ -104,14 +96,10 @@ def _background(size: tuple[int, int], look: Look, rng: np.random.Generator) -> 
     return np.clip(look.background + look.clutter * (texture + slope), 0, 255).astype(np.uint8)
 
 
-def _liquid_mask(scene: Scene, camera: CameraModel) -> np.ndarray:
-    mask = np.zeros(camera.size[::-1], np.uint8)
-    if scene.fill <= 0:
-        return mask
+def _draw_liquid(image: np.ndarray, scene: Scene, camera: CameraModel, look: Look) -> None:
     body = np.concatenate([circle(scene.cup_radius, 0.0), circle(scene.cup_radius, scene.fill)])
     hull = opencv().convexHull(camera.project(body).astype(np.float32))
-    opencv().fillConvexPoly(mask, _fixed(hull[:, 0]), 255, shift=SUBPIXEL_BITS)
-    return mask
+    opencv().fillConvexPoly(image, fixed_point(hull[:, 0]), int(look.liquid), shift=SUBPIXEL_BITS)
 
 
 def _glass_lines(scene: Scene, camera: CameraModel) -> tuple[np.ndarray, ...]:
@@ -135,22 +123,8 @@ def _back_lines(scene: Scene, camera: CameraModel) -> tuple[np.ndarray, ...]:
 
 def _draw_lines(image: np.ndarray, lines: Sequence[np.ndarray], grey: float) -> None:
     cv2 = opencv()
-    fixed = [_fixed(line) for line in lines]
+    fixed = [fixed_point(line) for line in lines]
     cv2.polylines(image, fixed, False, int(grey), 1, cv2.LINE_AA, SUBPIXEL_BITS)
-
-
-def _draw_submerged(image: np.ndarray, stage: Stage, state: WorldState) -> None:
-    outline = submerged_outline(state, stage.camera, stage.scene)
-    if outline is None or not np.isfinite(outline).all():
-        return
-    cv2 = opencv()
-    window = window_around(outline, stage.camera.size)
-    rows, columns = slice(window.top, window.bottom), slice(window.left, window.right)
-    drawn = image.copy()
-    grey = 0.7 * stage.look.stick + 0.3 * stage.look.liquid
-    cv2.fillPoly(drawn, [_fixed(outline)], int(grey), cv2.LINE_AA, SUBPIXEL_BITS)
-    wet = stage.liquid[rows, columns] > 0
-    image[rows, columns][wet] = drawn[rows, columns][wet]
 
 
 def _draw_stick(image: np.ndarray, stage: Stage, exposures: Sequence[WorldState]) -> None:
@@ -179,7 +153,9 @@ def _draw_gripper(image: np.ndarray, stage: Stage, state: WorldState) -> None:
     pixels = stage.camera.project(corners)
     if np.isfinite(pixels).all():
         hull = cv2.convexHull(pixels.astype(np.float32))[:, 0]
-        cv2.fillConvexPoly(image, _fixed(hull), int(stage.look.gripper), cv2.LINE_AA, SUBPIXEL_BITS)
+        cv2.fillConvexPoly(
+            image, fixed_point(hull), int(stage.look.gripper), cv2.LINE_AA, SUBPIXEL_BITS
+        )
 
 
 def _draw_marker(image: np.ndarray, stage: Stage, exposures: Sequence[WorldState]) -> None:
@@ -194,6 +170,6 @@ def _draw_marker(image: np.ndarray, stage: Stage, exposures: Sequence[WorldState
     blend(image, window, coverage, stage.look.marker)
 
 
-def _fixed(pixels: np.ndarray) -> np.ndarray:
+def fixed_point(pixels: np.ndarray) -> np.ndarray:
     """Pixels as OpenCV's fixed-point numbers, shape (N, 1, 2)."""
     return np.rint(np.clip(pixels, -4e3, 4e3) * 2**SUBPIXEL_BITS).astype(np.int32)[:, None]

@@ -21,7 +21,6 @@ class Scene:
         gripper_half_width: In x and in y.
         gripper_below: How far the gripper hangs below the pivot.
         gripper_above: How far it reaches above.
-        refractive_index: Of the liquid.
     """
 
     marker_offset: tuple[float, float, float]
@@ -34,7 +33,6 @@ class Scene:
     gripper_half_width: float = 0.02
     gripper_below: float = 0.01
     gripper_above: float = 0.04
-    refractive_index: float = 1.33
 
 
 @dataclass(frozen=True)
@@ -49,7 +47,6 @@ class Look:
         defocus: Standard deviation of the lens's blur [px].
         read_noise: Standard deviation of the noise in the dark.
         shot_noise: Variance per grey level.
-        faults: Share of the frames with an occlusion or glare.
     """
 
     background: float = 190.0
@@ -63,7 +60,6 @@ class Look:
     defocus: float = 0.8
     read_noise: float = 2.0
     shot_noise: float = 0.05
-    faults: float = 0.1
 
 
 BRIGHT_STICK = Look(background=50.0, stick=210.0, liquid=90.0, gripper=30.0)

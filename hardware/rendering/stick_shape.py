@@ -1,4 +1,4 @@
-"""Outlines of the stick in the picture: above the surface, and refracted below it."""
+"""Outline of the stick in the picture, above the liquid's surface."""
 
 import numpy as np
 
@@ -43,41 +43,3 @@ def _touching_radii(
     cosine = radius / distance
     sine = np.sqrt(1.0 - cosine**2)
     return radius * np.stack([cosine * towards + sine * aside, cosine * towards - sine * aside])
-
-
-def submerged_outline(
-    state: WorldState, camera: CameraModel, scene: Scene, points: int = 6
-) -> np.ndarray | None:
-    """Outline of the image of the stick below the surface, as the round wall refracts it.
-
-    Every point of the axis is moved to its paraxial image through the cylinder of liquid: with
-    s the depth behind the front wall and R the radius, the image lies n s / (n - (n-1) s/R) / n
-    behind the wall, and is n / (n - (n-1) s/R) times as far aside and as wide. The thin glass is
-    left out, and so is the view through the surface from above. This is right near the cup's
-    middle and an approximation towards its sides.
-
-    Returns:
-        Pixels, shape (2 `points`, 2), down one side and up the other; None when nothing is below.
-    """
-    entry = surface_share(state, scene)
-    if entry >= 1.0:
-        return None
-    shares = np.linspace(entry, 1.0, points)
-    axis = state.pivot + np.outer(shares * scene.stick_length, direction(state.inclination))
-    view = camera.position * [1.0, 1.0, 0.0]
-    front = view / np.linalg.norm(view)
-    aside = np.array([-front[1], front[0], 0.0])
-    behind = scene.cup_radius - axis @ front
-    index, radius = scene.refractive_index, scene.cup_radius
-    magnified = index / (index - (index - 1.0) * behind / radius)
-    apparent_depth = behind * magnified / index
-    image = (
-        np.outer(radius - apparent_depth, front)
-        + np.outer(magnified * (axis @ aside), aside)
-        + np.outer(axis[:, 2], [0.0, 0.0, 1.0])
-    )
-    wide = np.outer(magnified * scene.stick_radius, aside)
-    kept = np.hypot(axis[:, 0], axis[:, 1]) < radius
-    if kept.sum() < 2:
-        return None
-    return camera.project(np.concatenate([(image + wide)[kept], (image - wide)[kept][::-1]]))

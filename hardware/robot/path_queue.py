@@ -29,14 +29,12 @@ class Course(NamedTuple):
         leg: The path that runs.
         at: Its sample.
         waiting: Paths that come after it.
-        played: Samples of all paths so far.
     """
 
     hold: np.ndarray
     leg: Leg | None = None
     at: int = 0
     waiting: tuple[Leg, ...] = ()
-    played: int = 0
 
 
 class LegChange(NamedTuple):
@@ -56,15 +54,12 @@ def advanced(course: Course) -> tuple[Course, LegChange]:
     leg = course.leg
     if leg is not None and course.at + 1 < len(leg.base):
         at = course.at + 1
-        moved = course._replace(at=at, hold=leg.base[at], played=course.played + 1)
-        return moved, LegChange(None, None)
+        return course._replace(at=at, hold=leg.base[at]), LegChange(None, None)
     if course.waiting:
         first, *rest = course.waiting
         # what is commanded already is not commanded again: joined paths keep their time
         at = 1 if np.array_equal(first.base[0], course.hold) else 0
-        moved = course._replace(
-            leg=first, at=at, hold=first.base[at], waiting=tuple(rest), played=course.played + 1
-        )
+        moved = Course(first.base[at], leg=first, at=at, waiting=tuple(rest))
         return moved, LegChange(leg, first)
     return course._replace(leg=None), LegChange(leg, None)
 

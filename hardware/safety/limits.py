@@ -11,17 +11,10 @@ import numpy as np
 from ..arm import Tool
 from ..errors import MotionRejected
 from ..motion.cup_frame import cup_frame
-from ..motion.kinematics import (
-    UR10,
-    UR10E,
-    DhArm,
-    follow,
-    inverse,
-)
+from ..motion.kinematics import ARMS, DhArm, follow, inverse
 from ..motion.stir_paths import PosePath
 from ..rig import AxisLimits, Limits, Rig
 
-ARMS = {"cb3": UR10, "e-series": UR10E}
 MAX_TILT = {
     "stirring": np.radians(15.0),
     "pouring": np.radians(150.0),
@@ -279,12 +272,12 @@ def _first_joints(pose: np.ndarray, space: Workspace, joints: np.ndarray | None)
     if not np.isfinite(near).all():
         raise _rejected(f"the arm's joints {near.tolist()} are not finite", _when(0.0))
     first = inverse(space.arm, pose, near, tcp=space.tcp)
-    if first.status == "unreachable":
+    if first is None:
         raise _rejected("no joints reach its first pose", _when(0.0))
-    away = float(np.abs(first.joints - near).max())
+    away = float(np.abs(first - near).max())
     if joints is not None and not away <= JOINT_AGREEMENT:
         raise _rejected(f"its first pose is {away:.2f} rad of a joint from the arm", _when(0.0))
-    return first.joints
+    return first
 
 
 def _check_reach(part: _Part, space: Workspace, rig: Rig, joints: np.ndarray) -> np.ndarray:

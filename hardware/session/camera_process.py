@@ -121,9 +121,14 @@ class _CameraProcess:
         self._tally = _Tally(no_rate(host_time()))
         self._stamps: tuple[float, float] | None = None  # the first and the latest [s]
         self._meter = FrameMeter(stick_view(rig, view))
-        self._table: CsvAppender | None = None
-        self._video: VideoWriter | None = None
-        disk.write(frames_file(view), partial(self._open, rig, directory))
+        camera, table, video = rig.camera(view), frames_file(view), video_file(view)
+        size = (camera.width, camera.height)
+        self._table = disk.write(
+            table, lambda: CsvAppender(directory / table, FrameMeasurement._fields)
+        )
+        self._video = disk.write(
+            video, lambda: VideoWriter(directory / video, size=size, rate=camera.rate)
+        )
 
     def follow(self, make_camera: Callable[[], FrameSource], leaving: Event) -> None:
         """Take pictures until the end, or until the camera gives no more."""
@@ -152,13 +157,6 @@ class _CameraProcess:
         """Write the last event."""
         tally = self._tally
         self._disk.tell("left", frames=tally.rate.total, lost=tally.lost, reason=reason)
-
-    def _open(self, rig: Rig, directory: Path) -> None:
-        camera = rig.camera(self._view)
-        self._table = CsvAppender(directory / frames_file(self._view), FrameMeasurement._fields)
-        size = (camera.width, camera.height)
-        path = directory / video_file(self._view)
-        self._video = VideoWriter(path, size=size, rate=camera.rate)
 
     def _take(self, frame: Frame, came: float) -> None:
         row = self._meter.measure(frame)

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
@@ -24,18 +23,6 @@ class SessionStopped(RuntimeError):
 
 class SessionInterrupted(SessionStopped):
     """A person stopped it by Ctrl-C."""
-
-
-class Phase(Enum):
-    """Where a session is between its start and its end."""
-
-    NEW = "new"  # nothing is started, no file is written
-    CHECKING = "checking"  # the pre-flight list is on its way
-    REFUSED = "refused"  # the list has failures: the arm takes no order
-    READY = "ready"  # the arm rests, every path that was ordered is done
-    MOVING = "moving"  # paths that were ordered are not done yet
-    STOPPED = "stopped"  # the arm was stopped for good
-    CLOSED = "closed"
 
 
 class Status(NamedTuple):
@@ -64,7 +51,6 @@ class Progress:
 
     Attributes:
         writing: Held by whoever writes.
-        started: Whether the processes were started.
         checked: The pre-flight list, once it is there.
         told: The latest readings.
         began: Paths that have begun.
@@ -77,7 +63,6 @@ class Progress:
     """
 
     writing: AbstractContextManager = field(default_factory=threading.RLock)
-    started: bool = False
     checked: Checked | None = None
     told: Told = field(default_factory=lambda: Told((), np.full(6, np.nan)))
     began: list[Began] = field(default_factory=list)
@@ -97,20 +82,6 @@ class Progress:
     def busy(self) -> bool:
         """Whether a path that was ordered is not done."""
         return len(self.done) < self.ordered
-
-    @property
-    def phase(self) -> Phase:
-        if self.closing:
-            return Phase.CLOSED
-        if self.stopped is not None:
-            return Phase.STOPPED
-        if not self.started:
-            return Phase.NEW
-        if self.checked is None:
-            return Phase.CHECKING
-        if self.refused:
-            return Phase.REFUSED
-        return Phase.MOVING if self.busy else Phase.READY
 
     def take(self, report: Report) -> None:
         """Note a report of the control process."""

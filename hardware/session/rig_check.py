@@ -13,7 +13,7 @@ from ..rig import Camera, Rig
 from ..robot.ur import URReader
 from ..safety.limits import check_path
 from ..safety.preflight import Check, controller_checks, place_check
-from .cameras import RigCamera
+from .cameras import open_camera
 
 RTDE_PORT = 30004
 ANSWER_SECONDS = 2.0  # s
@@ -64,7 +64,7 @@ def _lens(camera: Camera) -> str:
 
 
 def _picture(camera: Camera) -> str:
-    with closing(RigCamera(camera)()) as source:
+    with closing(open_camera(camera)) as source:
         frame = source.read()
     if frame is None:
         raise CameraError(f"{camera.source!r} gives no picture")

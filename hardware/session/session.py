@@ -21,7 +21,7 @@ from ..safety.limits import check_path
 from ..safety.preflight import Check, failures
 from ..signals import ignored_interrupts
 from .processes import Processes
-from .progress import Phase, Progress, SessionStopped, Status
+from .progress import Progress, SessionStopped, Status
 from .setup import SessionSetup
 
 END_SIGNALS = (signal.SIGTERM, signal.SIGHUP)  # Ctrl-C raises KeyboardInterrupt already
@@ -37,7 +37,7 @@ class Session:
     Where other libraries of robots have another word:
 
         connect             start(), or entering the `with` block
-        is_connected        phase is Phase.READY or Phase.MOVING
+        is_connected        preflight() has no failures, and status().stopped is None
         get_observation     status()
         send_action         follow(path), a whole path; wait() until it is done
         stop                stop(reason), for good
@@ -79,11 +79,6 @@ class Session:
             self.stop(f"{kind.__name__} in the main process: {error}")
         self.close()
 
-    @property
-    def phase(self) -> Phase:
-        """Where the session is between its start and its end."""
-        return self._progress.phase
-
     def start(self) -> None:
         """Make the directory and start the processes; the pre-flight list is then on its way.
 
@@ -91,7 +86,7 @@ class Session:
             SessionStopped: The session was started or closed before.
             RigError: The directory cannot be used, or the confirmation was used before.
         """
-        if self._log is not None or self.phase is not Phase.NEW:
+        if self._log is not None or self._progress.closing:
             raise SessionStopped("a session starts once; make a new one for another recording")
         self._log = self._begin_recording()
         self._processes = Processes(self.board, self._log, self._progress)
@@ -106,7 +101,6 @@ class Session:
             self.close()
             self.discard_unless_moved()
             raise
-        self._progress.started = True
         self._processes.supervise()
 
     def _begin_recording(self) -> EventLog:
@@ -235,7 +229,7 @@ class Session:
         What failed before the first motion must not be in the way of the next try. A dry run, which
         never moves, calls this only if what it recorded is of no use.
         """
-        if self.phase is Phase.CLOSED and self._log is not None and not self._progress.ordered:
+        if self._progress.closing and self._log is not None and not self._progress.ordered:
             discard_directory(self.directory)
 
     def _end_all(self) -> None:

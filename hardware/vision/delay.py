@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 
 from ..motion.trajectory import Trajectory
 from .camera_model import CameraModel
-from .measurement_series import FrameSeries
+from .inclination import FrameSeries
 
 SEARCH_RANGE = 0.5  # s on both sides of none
 SEARCH_STEP = 0.01  # s

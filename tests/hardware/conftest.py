@@ -129,7 +129,7 @@ class SteppedControl:
         self.clock.sleep(2.0)
         assert self.emulator.controller.snapshot.resting
         assert self.emulator.controller.snapshot.runtime_state == 1
-        assert self.emulator.controller.arm.started == 1
+        assert self.emulator.controller.started == 1
         (stopped,), (event,) = self.reported(Stopped), self.events("stopped")
         assert (event["reason"], event["guard"]) == (stopped.reason, stopped.guard)
         return stopped, max(self.moved) - acted[0]
@@ -214,7 +214,7 @@ def stepped(tmp_path, stepped_loop, step_emulator, at_once):
     def make(rig: Rig, tool: Tool, start, *, armed: bool = True, cameras: bool = False):
         space, clock = workspace(rig, tool), SteppedClock()
         base = cup_frame(rig.cup).to_base(start)
-        joints = inverse(space.arm, base, space.start, tcp=space.tcp).joints
+        joints = inverse(space.arm, base, space.start, tcp=space.tcp)
         emulator = step_emulator(clock, joints=tuple(joints.tolist()), seed=1)
         controller = ur.URController(emulator.address)
         probes = base[None] if armed else np.empty((0, 6))

@@ -2,7 +2,7 @@
 
 import numpy as np
 from bolfi_liquids.hardware.rendering.coverage import bar_coverage, blend, window_around
-from bolfi_liquids.hardware.rendering.faults import noise_pool
+from bolfi_liquids.hardware.rendering.noise import noise_pool
 from bolfi_liquids.hardware.vision.camera_model import CameraModel
 from bolfi_liquids.hardware.vision.charuco import CharucoBoard
 from bolfi_liquids.hardware.vision.opencv import opencv

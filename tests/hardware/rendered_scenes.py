@@ -9,7 +9,7 @@ from bolfi_liquids.hardware.rendering import Look, Scene, WorldState
 from bolfi_liquids.hardware.vision.camera_model import CameraModel, look_at
 from bolfi_liquids.hardware.vision.stick_view import StickView
 
-CLEAN = Look(clutter=0.0, exposure=0.0, defocus=0.0, read_noise=0.0, shot_noise=0.0, faults=0.0)
+CLEAN = Look(clutter=0.0, exposure=0.0, defocus=0.0, read_noise=0.0, shot_noise=0.0)
 
 PIVOT_TO_MARKER = 0.02  # m, from the pivot to the face of the gripper that carries a marker
 MARKER_ABOVE = 0.025  # m

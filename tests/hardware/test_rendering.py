@@ -10,11 +10,12 @@ from bolfi_liquids.hardware.rendering import (
     Look,
     WorldState,
     exposure_times,
-    fault_of,
     prepare,
     render,
 )
 from bolfi_liquids.hardware.rendering.shared_world import ROWS, SharedWorld
+from rendered_faults import fault_of, render_with
+from rendered_refraction import refracted
 from rendered_scenes import CLEAN, rehearsal_camera, rehearsal_scene
 
 pytest.importorskip("cv2")
@@ -82,7 +83,8 @@ def test_the_submerged_part_looks_as_wide_and_as_far_aside_as_the_refractive_ind
     # on the cup's axis plane a cylinder of liquid magnifies by its refractive index
     pivot = (0.012, 0.0, 0.235)
     look = dataclasses.replace(CLEAN, liquid=190.0, glass=190.0)
-    image = picture([state(0.0, pivot=pivot)], look)
+    stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), look)
+    image = refracted(stage, state(0.0, pivot=pivot), RNG)
     above, below = image[290].astype(float), image[390].astype(float)
     shift = []
     for line in (above, below):
@@ -103,21 +105,21 @@ def test_noise_has_the_strength_that_was_asked_for():
 
 def test_faults_are_as_frequent_as_asked_and_repeat_with_the_seed():
     stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), Look())
-    drawn = [fault_of(k, 0.1, stage.area, 3) for k in range(9000)]
+    drawn = [fault_of(k, 0.1, stage, 3) for k in range(9000)]
     share = np.mean([fault is not None for fault in drawn])
     # 3000 independent draws of three frames each
     assert share == pytest.approx(0.1, abs=4 * np.sqrt(0.09 / 3000))
     assert {fault.kind for fault in drawn if fault} == {"hand", "hose", "glare"}
-    assert fault_of(77, 1.0, stage.area, 3) == fault_of(77, 1.0, stage.area, 3)
+    assert fault_of(77, 1.0, stage, 3) == fault_of(77, 1.0, stage, 3)
 
 
 @pytest.mark.parametrize("kind", ["hand", "hose", "glare"])
 def test_each_fault_changes_the_picture_near_its_place(kind):
     stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), CLEAN)
-    faults = (fault_of(k, 1.0, stage.area, 0) for k in range(300))
+    faults = (fault_of(k, 1.0, stage, 0) for k in range(300))
     fault = next(fault for fault in faults if fault is not None and fault.kind == kind)
     clean = render(stage, [state(3.0)], RNG)
-    wrong = render(stage, [state(3.0)], RNG, fault)
+    wrong = render_with(fault, stage, [state(3.0)], RNG)
     column, row = (int(value) for value in fault.place)
     near = np.s_[max(row - 5, 0) : row + 6, max(column - 5, 0) : column + 6]
     assert np.abs(wrong[near].astype(int) - clean[near]).max() > 10

@@ -33,8 +33,8 @@ def started(rig: Rig, shift=(0.0, 0.0, 0.0)) -> Rig:
     space, place = workspace(rig, "stirring"), above_cup(rig)
     place[:3] += shift
     found = inverse(space.arm, cup_frame(rig.cup).to_base(place), space.start, tcp=space.tcp)
-    assert found.status == "ok"
-    return changed(rig, robot={"start": tuple(np.round(found.joints, 5).tolist())})
+    assert found is not None
+    return changed(rig, robot={"start": tuple(np.round(found, 5).tolist())})
 
 
 def rig_of(controller: str) -> Rig:

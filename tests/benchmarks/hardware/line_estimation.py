@@ -13,14 +13,16 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from bolfi_liquids.hardware.rendering import Look, WorldState, fault_of, prepare, render
+from bolfi_liquids.hardware.rendering import Look, WorldState, prepare
 from bolfi_liquids.hardware.vision import Frame, FrameMeter
 
 sys.path.append(str(Path(__file__).parents[2] / "hardware"))
+from rendered_faults import fault_of, render_with  # noqa: E402
 from rendered_scenes import rehearsal_camera, rehearsal_scene, stick_view  # noqa: E402
 
 BAR = 5.0  # ms, for 95 % of the frames
 LOOK = Look()
+FAULTS = 0.1  # share of the frames with an occlusion or glare
 RATE = 30.0  # Hz
 WARM = 20  # frames that are not timed
 SWING, TILT = 0.8, np.radians(20.0)  # Hz and amplitude of a stick in motion
@@ -35,9 +37,9 @@ def pictures(view: str, count: int) -> list[Frame]:
     for at in range(count):
         turn = 2 * np.pi * SWING * at / RATE
         pivot = np.array([REACH * np.cos(0.3 * turn), REACH * np.sin(0.3 * turn), HEIGHT])
-        fault = fault_of(at, LOOK.faults, stage.area, 0)
+        fault = fault_of(at, FAULTS, stage, 0)
         state = WorldState(at / RATE, pivot, TILT * np.array([np.sin(turn), np.cos(turn)]))
-        frames.append(Frame(at, at / RATE, render(stage, [state] * 3, rng, fault)))
+        frames.append(Frame(at, at / RATE, render_with(fault, stage, [state] * 3, rng)))
     return frames
 
 

@@ -2,7 +2,6 @@ import os
 import resource
 import signal
 import time
-from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
@@ -37,7 +36,7 @@ keeps_time = pytest.mark.punctual
 
 RIG = bundled_rig()
 HEIGHT = RIG.stirring.height
-CALM = replace(Look(), faults=0.0)
+CALM = Look()
 
 
 @cache

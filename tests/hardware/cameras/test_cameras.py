@@ -13,7 +13,6 @@ from bolfi_liquids.hardware.cameras import (
     RenderedCamera,
     Timing,
     Webcam,
-    WebcamSettings,
 )
 from bolfi_liquids.hardware.cameras.base import grey
 from bolfi_liquids.hardware.rendering import Look, prepare
@@ -118,7 +117,7 @@ def test_grey_is_the_usual_mixture():
 
 def test_a_webcam_delivers_frames_and_says_when_it_stops(video):
     # OpenCV opens a file like a device: this tries all but the driver's settings
-    camera = Webcam(str(video), WebcamSettings(size=(64, 48)))
+    camera = Webcam(str(video), size=(64, 48))
     first = camera.read()
     second = camera.read()
     assert first is not None and second is not None
@@ -133,7 +132,7 @@ def test_a_webcam_delivers_frames_and_says_when_it_stops(video):
 
 def test_a_webcam_of_another_size_is_refused(video):
     with pytest.raises(CameraError, match=r"view\.avi.*64x48 instead of 640x480"):
-        Webcam(str(video))
+        Webcam(str(video), size=(640, 480))
 
 
 def test_without_opencv_the_extra_is_named(monkeypatch):
@@ -142,13 +141,13 @@ def test_without_opencv_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "cv2", None)
     opencv.cache_clear()
     with pytest.raises(ImportError, match=r"bolfi-liquids\[cameras\]"):
-        Webcam(0)
+        Webcam(0, size=(64, 48))
     opencv.cache_clear()
 
 
 def test_a_webcam_that_is_not_there_is_named(tmp_path):
     with pytest.raises(CameraError, match="no_camera"):
-        Webcam(str(tmp_path / "no_camera"))
+        Webcam(str(tmp_path / "no_camera"), size=(64, 48))
 
 
 class Capture:
@@ -197,7 +196,7 @@ def test_a_picture_that_the_driver_has_kept_is_passed_over(monkeypatch):
     driver = Capture()
     monkeypatch.setattr(cv2, "VideoCapture", lambda _: driver)
     monkeypatch.setattr("bolfi_liquids.hardware.cameras.webcam.time", driver)
-    camera = Webcam(0, WebcamSettings(size=(64, 48)))
+    camera = Webcam(0, size=(64, 48))
     for pause in (0.0, 0.012, 0.11, 0.0, 0.025, 0.5):
         driver.now += pause
         frame = camera.read()

@@ -45,7 +45,7 @@ def motion(robot_time):
 def camera_of(view):
     camera = RIG.camera(view)
     scene = Scene(marker_offset=camera.marker, marker_radius=camera.marker_radius)
-    stage = prepare(scene, camera_model(camera), Look(faults=0.02))
+    stage = prepare(scene, camera_model(camera), Look())
     time = ROBOT + host_time() + np.arange(-2.0, 40.0, 0.01)
     world = MovingWorld(*(CubicSpline(time, y) for y in motion(time)), offset=ROBOT)
     return partial(RenderedCamera, stage, world, Timing(seed=WHO[view]))

@@ -10,7 +10,6 @@ import sys
 from collections.abc import Callable
 
 from bolfi_liquids.hardware.errors import RigError
-from bolfi_liquids.hardware.motion.kinematics import ARMS
 from bolfi_liquids.hardware.priority import hurry
 
 from .controller import HOME_JOINTS, MODELS, Options
@@ -40,7 +39,6 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m ur_controller", description=__doc__)
     parser.add_argument("--address", default="127.0.0.5", help="one of 127.0.0.0/8")
     parser.add_argument("--controller", choices=sorted(MODELS), default="cb3")
-    parser.add_argument("--arm", choices=sorted(ARMS), help="default: that of the controller")
     parser.add_argument(
         "--joints", type=json.loads, default=list(HOME_JOINTS), help="JSON, six in rad"
     )
@@ -59,7 +57,6 @@ def _options(given: argparse.Namespace) -> Options:
         raise ValueError(f"--rate must be between 10 and 500 ticks per second, got {given.rate}")
     return Options(
         controller=given.controller,
-        arm=given.arm,
         joints=tuple(float(value) for value in given.joints),
         tcp=tuple(float(value) for value in given.tcp),
         rate=given.rate,

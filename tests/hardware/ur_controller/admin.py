@@ -5,8 +5,6 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from .controller import Controller
 from .network import Connection, Network
 from .snapshot import Snapshot
@@ -47,9 +45,7 @@ class AdminSession:
             "protective_stop": self._protective_stop,
             "freeze": lambda request: _done(faults.freeze(_seconds(request))),
             "drop": lambda _: _done(faults.drop()),
-            "late": self._late,
-            "place": self._place,
-            "motions": lambda _: {"started": controller.arm.started},
+            "motions": lambda _: {"started": controller.started},
         }
 
     def received(self) -> None:
@@ -85,16 +81,6 @@ class AdminSession:
 
     def _protective_stop(self, _: dict) -> dict:
         return _done(self._controller.protective_stop("asked for at the admin port"))
-
-    def _late(self, request: dict) -> dict:
-        self._faults.late = _seconds(request)
-        return {"ok": True}
-
-    def _place(self, request: dict) -> dict:
-        joints = np.array(_six(request["joints"]))
-        if np.abs(joints).max() > self._controller.arm.mounted.arm.joint_limit:
-            raise ValueError(f"joints {joints.tolist()} are beyond the joint limits")
-        return _done(self._controller.arm.place(joints))
 
 
 def as_dict(snapshot: Snapshot, reason: str) -> dict[str, Any]:

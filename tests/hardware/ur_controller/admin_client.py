@@ -76,14 +76,6 @@ class Admin:
         """Close all connections to the robot's ports."""
         self._ask("drop")
 
-    def late(self, seconds: float) -> None:
-        """Send data packages so much later, until the next call."""
-        self._ask("late", seconds=seconds)
-
-    def place(self, joints: Sequence[float]) -> None:
-        """Put the arm at rest at these joints [rad]."""
-        self._ask("place", joints=[float(value) for value in joints])
-
     def motions(self) -> int:
         """How often the arm began to move since the start."""
         return int(self._ask("motions")["started"])

@@ -1,11 +1,10 @@
 """The controller: program, safety and arm, one tick after the other.
 
-It answers ur_rtde's real client as a UR controller does: registers, recipes, the control script's
-commands and threads, watchdog, protective stop, dashboard. Its arm is that of the emulated rig,
-with a queue of motions. Not emulated: forces and inertia of the arm, payload errors, blends (a path
-stops at its corners), the real servo filter (an assumed one stands for it), safety planes, force
-mode, servoC, moveP, freedrive, scripts other than ur_rtde's. Passing here is no acceptance test of
-a robot.
+It answers ur_rtde's real client as a UR controller does, in all that our driver asks of it:
+registers, recipes, set-points, tool and payload, watchdog, protective stop. Its arm is that of the
+emulated rig. Not emulated: forces and inertia of the arm, payload errors, the real servo filter (an
+assumed one stands for it), safety planes, other motions, other scripts than ur_rtde's. Passing here
+is no acceptance test of a robot.
 """
 
 import sys
@@ -18,21 +17,15 @@ from bolfi_liquids.hardware.emulated.arm import (
     PROTECTIVE_STOP_RATE,
     STOPPED,
 )
-from bolfi_liquids.hardware.emulated.motion import MotionError
+from bolfi_liquids.hardware.emulated.motion import KinematicArm, MotionError
 from bolfi_liquids.hardware.host_clock import REAL_CLOCK, HostClock
 from bolfi_liquids.hardware.motion.kinematics import ARMS
 from bolfi_liquids.hardware.safety.guards import NORMAL, PLAYING
 
-from .commands import ProgramError
 from .force import ForceReading
-from .program import Program
-from .queued_arm import QueuedArm
+from .program import Program, ProgramError, ScriptError
 from .registers import Registers
-from .script import ScriptError, parse
 from .snapshot import Snapshot
-
-NORMAL_MODE, PROTECTIVE_MODE = 1, 3
-STEADY_AFTER = 0.5  # s
 
 
 class Model(NamedTuple):
@@ -41,19 +34,17 @@ class Model(NamedTuple):
     Attributes:
         version: Of its software: major, minor, bugfix, build.
         rate: Ticks per second.
-        arm: Key of `kinematics.ARMS`.
         dated: The version as the dashboard tells it.
     """
 
     version: tuple[int, int, int, int]
     rate: float
-    arm: str
     dated: str
 
 
 MODELS = {
-    "cb3": Model((3, 15, 8, 106339), 125.0, "ur10", "URSoftware 3.15.8.106339 (Nov 05 2021)"),
-    "e-series": Model((5, 11, 6, 108000), 500.0, "ur10e", "URSoftware 5.11.6.108000 (Nov 10 2021)"),
+    "cb3": Model((3, 15, 8, 106339), 125.0, "URSoftware 3.15.8.106339 (Nov 05 2021)"),
+    "e-series": Model((5, 11, 6, 108000), 500.0, "URSoftware 5.11.6.108000 (Nov 10 2021)"),
 }
 # elbow up, tool pointing down, in front of the base
 HOME_JOINTS = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
@@ -75,28 +66,28 @@ class Options(NamedTuple):
     """How the emulator is set up; None leaves the choice to the controller's generation.
 
     Attributes:
-        controller: Key of `MODELS`.
-        arm: Key of `kinematics.ARMS`.
+        controller: Key of `MODELS` and of `kinematics.ARMS`.
         joints: At the start [rad].
         tcp: The tool's centre in the flange's frame, as its installation has it [m, rad].
         rate: Ticks per second.
         seed: Of the force's noise.
-        tcp_speed: Safety limit [m/s].
         unlock_after: A protective stop cannot be unlocked earlier [s].
     """
 
     controller: str = "cb3"
-    arm: str | None = None
     joints: tuple[float, ...] = HOME_JOINTS
     tcp: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     rate: float | None = None
     seed: int = 0
-    tcp_speed: float = 1.5
     unlock_after: float = 5.0
 
 
 class Controller:
-    """State of the emulated controller; servers read and write it between ticks."""
+    """State of the emulated controller; servers read and write it between ticks.
+
+    Attributes:
+        started: How often the arm began to move.
+    """
 
     def __init__(self, options: Options, clock: HostClock = REAL_CLOCK):
         self.clock = clock
@@ -106,9 +97,8 @@ class Controller:
         self.rate = options.rate or model.rate
         self.dt = 1.0 / self.rate
         self.registers = Registers()
-        arm = ARMS[options.arm or model.arm]
-        self.arm = QueuedArm(arm, np.array(options.joints), tcp_speed=options.tcp_speed)
-        self.arm.mount(np.array(options.tcp))
+        joints, tcp = np.array(options.joints), np.array(options.tcp)
+        self.arm = KinematicArm(ARMS[options.controller], joints, tcp)
         self.force = ForceReading(options.seed)
         self.program: Program | None = None
         self.payload: tuple[float, tuple[float, ...]] = (0.0, (0.0, 0.0, 0.0))
@@ -116,13 +106,9 @@ class Controller:
         self._unlock_after = options.unlock_after
         self._protective_since: float | None = None
         self._watchdog: Watchdog | None = None
+        self.started = 0
         self._ticks = 0
-        self._rested = 0
         self.snapshot = self._look()
-
-    @property
-    def steady(self) -> bool:
-        return self._rested * self.dt >= STEADY_AFTER
 
     @property
     def protective(self) -> bool:
@@ -130,16 +116,14 @@ class Controller:
 
     def load(self, text: str) -> None:
         """Start an uploaded script, instead of the one that runs."""
-        try:
-            script = parse(text)
-        except ScriptError as err:
-            self._note(str(err))
-            return
         self.end_program("replaced by another script")
         if self.protective:
             self._note("a script was sent during a protective stop; it does not start")
             return
-        self.program = Program(script, self)
+        try:
+            self.program = Program(text, self)
+        except ScriptError as err:
+            self._note(str(err))
 
     def end_program(self, reason: str) -> None:
         """Stop the program; the arm comes to rest."""
@@ -147,8 +131,7 @@ class Controller:
             return
         self._note(f"program stopped: {reason}")
         self.program, self._watchdog = None, None
-        if self.arm.busy or not self.arm.resting:
-            self.arm.stop(PROGRAM_STOP_RATE)
+        self.arm.stop(PROGRAM_STOP_RATE)
 
     def protective_stop(self, reason: str) -> None:
         self._note(f"protective stop: {reason}")
@@ -166,7 +149,7 @@ class Controller:
 
     def receive(self, values: dict[str, float | int]) -> None:
         """Data package of a client."""
-        self.registers.write(values)
+        self.registers.inputs.update(values)
         if self._watchdog is not None and self._watchdog.register in values:
             self._watchdog = self._watchdog._replace(kicked=self._ticks)
 
@@ -177,9 +160,6 @@ class Controller:
 
     def set_payload(self, mass: float, centre: tuple[float, ...]) -> None:
         self.payload = (mass, centre)
-
-    def zero_force(self) -> None:
-        self.force.zero()
 
     def skip(self, ticks: int) -> None:
         """Let the clock go on by ticks that the computer had no time for."""
@@ -200,11 +180,12 @@ class Controller:
             self.end_program(f"error: {err}")
         except MotionError as err:
             self.protective_stop(str(err))
+        rested = self.arm.resting
         try:
-            self.arm.tick(self.dt, self.registers.slider)
+            self.arm.tick(self.dt)
         except MotionError as err:
             self.protective_stop(str(err))
-        self._rested = self._rested + 1 if self.arm.resting else 0
+        self.started += rested and not self.arm.resting
         self.snapshot = self._look()
         return self.snapshot
 
@@ -215,20 +196,14 @@ class Controller:
             time=self._ticks * self.dt,
             host=self.clock.now(),
             joints=tuple(arm.state.joints.tolist()),
-            joint_speeds=tuple(arm.state.speed.tolist()),
             pose=tuple(arm.pose.tolist()),
             velocity=tuple(arm.velocity.tolist()),
             force=self.force.read(),
             runtime_state=PLAYING if playing else STOPPED,
-            safety_mode=PROTECTIVE_MODE if self.protective else NORMAL_MODE,
             safety_bits=PROTECTIVE_BITS if self.protective else NORMAL,
             robot_bits=1 | 2 * playing,
-            slider=registers.slider,
-            scaling=registers.slider,
             payload=self.payload[0],
             payload_centre=self.payload[1],
-            digital_outputs=registers.digital_outputs,
-            analog_outputs=tuple(registers.analog_outputs),
             output_ints=tuple(registers.output_ints),
             output_doubles=tuple(registers.output_doubles),
             resting=arm.resting,

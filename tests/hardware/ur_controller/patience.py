@@ -2,23 +2,18 @@
 
 from functools import cached_property
 
+from bolfi_liquids.hardware.emulated.rig import STALL_SECONDS
+from bolfi_liquids.hardware.emulated.rig import patient as emulated_patient
 from bolfi_liquids.hardware.rig import Rig
 from bolfi_liquids.hardware.session.setup import SessionSetup
 
-STALL_SECONDS = 1.0  # s, in which neither the arm nor its controller moves on
-
 
 def patient(rig: Rig) -> Rig:
-    """The rig with guards that do not mind a stall; wider than a rig's file may ask for."""
-    limits = rig.limits.model_copy(
-        update={
-            "silence": STALL_SECONDS,
-            "overrun": STALL_SECONDS,
-            "frame_age": STALL_SECONDS,
-            # the arm stays behind its set-points by what they move on in a stall
-            "tracking_error": rig.limits.tracking_error + STALL_SECONDS * rig.limits.speed,
-        }
-    )
+    """As for the arm in our process, whose controller cannot fall silent."""
+    # the arm stays behind its set-points by what they move on in a stall
+    error = rig.limits.tracking_error + STALL_SECONDS * rig.limits.speed
+    wider = {"silence": STALL_SECONDS, "tracking_error": error}
+    limits = emulated_patient(rig).limits.model_copy(update=wider)
     return rig.model_copy(update={"limits": limits})
 
 

@@ -96,7 +96,7 @@ class ControllerProcess:
         base = cup_frame(rig.cup).to_base(pose)
         return cls.start(
             controller=rig.robot.controller,
-            joints=inverse(space.arm, base, space.start, tcp=space.tcp).joints,
+            joints=inverse(space.arm, base, space.start, tcp=space.tcp),
             options={"tcp": json.dumps(space.tcp.tolist())},
         )
 

@@ -1,63 +1,75 @@
-"""ur_rtde's control script at work: reads a command register each tick, answers, owns threads."""
+"""ur_rtde's control script at work: reads a command register each tick, carries it out, answers.
 
-from typing import TYPE_CHECKING, Literal
+Emulated are the script's upload and the commands that our driver gives; any other is an error.
+"""
 
-from bolfi_liquids.hardware.motion.poses import Numbers
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
-from .commands import COMMANDS, REALTIME_COMMANDS, ProgramError
-from .moves import Plan
-from .queued_arm import QueuedArm
+import numpy as np
+from bolfi_liquids.hardware.emulated.arm import PROGRAM_STOP_RATE
+from bolfi_liquids.hardware.emulated.motion import KinematicArm
+
 from .registers import Registers
-from .script import Script, Waypoint
 
 if TYPE_CHECKING:
     from .controller import Controller
 
-Thread = Literal["move", "stop", "servo", "speed"]
 READY, DONE = 1, 2
-STOP_SCRIPT = 255
-_RUNNING = 1 << 15
-_LONGEST = 127
+SERVO_STOP, SET_PAYLOAD, SERVO_L, SET_TCP = 16, 17, 24, 29
+SET_WATCHDOG, WITHIN_LIMITS, TCP_OFFSET, STOP_SCRIPT = 35, 36, 40, 255
+_OFFSET = re.compile(r"# int register offset\n\s*(\d+)")
+_END = re.compile(rb"^end[ \t\r]*\n", re.MULTILINE)
+
+
+class ScriptError(ValueError):
+    """The script is not one that the emulator knows."""
+
+
+class ProgramError(Exception):
+    """The script fails, as it would on the controller: it ends, and the arm stops."""
+
+
+def take_script(buffer: bytearray) -> str | None:
+    """Remove the first whole script from `buffer`: it ends with `end` at the line's start."""
+    found = _END.search(buffer)
+    if found is None:
+        return None
+    text = bytes(buffer[: found.end()]).decode("utf-8", "replace")
+    del buffer[: found.end()]
+    return text
 
 
 class Program:
     """A running control script.
 
-    The script runs a command to its end before it reads the next one, except that asynchronous
-    moves and stops, servo and speed motions go on in a thread of their own. As on the controller
-    only one thread may move the arm; a command that wants it beside another is an error, and
-    errors end the program.
+    The script runs a command to its end before it reads the next one, except that the arm goes on
+    to a set-point by itself. Errors end the program.
 
-    Attributes:
-        machine: What the script acts on.
-        thread: The thread that moves the arm, if one does.
-        linear_stop: Whether stopL and stopJ now stop along a line (an asynchronous one was used).
-        latest: The real-time command that was carried out last, with its numbers.
+    Raises:
+        ScriptError: The script is not ur_rtde's control script.
     """
 
-    def __init__(self, script: Script, machine: "Controller"):
-        self.script = script
-        self.machine = machine
-        self.thread: Thread | None = None
-        self.linear_stop = False
-        self.speeds_are_linear = True
-        self.latest: tuple[float, ...] = ()
-        self._blocked = False
+    def __init__(self, script: str, machine: "Controller"):
+        found = _OFFSET.search(script)
+        if found is None:
+            first = script.strip().splitlines()[:1]
+            raise ScriptError(f"only ur_rtde's control script is emulated, not {first}")
+        self._offset = int(found[1])
+        self._machine = machine
+        self._set_point: list[float] = []
         self._executing = False
-        self._path: tuple[Waypoint, ...] = ()
-        self._reported = -1
-        self._writes = 0
-        self._operation = 0
-        self.report(-1)
+        self._stopping = False
+        self._commands: dict[int, Callable[[], None]] = {
+            SERVO_STOP: self._servo_stop,
+            SET_PAYLOAD: self._set_payload,
+            SET_TCP: self._set_tcp,
+            SET_WATCHDOG: lambda: machine.set_watchdog(self._numbers(1)[0], self._offset),
+            WITHIN_LIMITS: lambda: self._give_integer(self._arm.reaches(self._pose())),
+            TCP_OFFSET: lambda: self._give(self._arm.tcp),
+        }
         self._answer(READY)
-
-    @property
-    def registers(self) -> Registers:
-        return self.machine.registers
-
-    @property
-    def arm(self) -> QueuedArm:
-        return self.machine.arm
 
     def tick(self) -> bool:
         """Go on; False once the program has ended.
@@ -66,114 +78,75 @@ class Program:
             ProgramError: The script fails; the controller ends it.
             MotionError: A motion is impossible; the controller makes a protective stop.
         """
-        self._watch_path()
-        if self._blocked:
-            if not self.arm.busy:
-                self._blocked = False
+        if self._stopping:
+            if self._arm.resting:
+                self._stopping = False
                 self._answer(DONE)
             return True
-        if self.thread in ("move", "stop") and not self.arm.busy:
-            self.thread = None
-            self.report(-1)
-        return self._read_command()
-
-    def _read_command(self) -> bool:
-        command = self.registers.integer(self.script.offset)
+        command = self._registers.integer(self._offset)
         if command == 0:
             self._executing = False
             self._answer(READY)
-        elif command in REALTIME_COMMANDS:
-            self._carry_out(command)
+        elif command == SERVO_L:
+            self._servo()
             self._answer(READY)
         elif not self._executing:
             if command == STOP_SCRIPT:
                 return False
             self._carry_out(command)
-            self._executing = True
-            if not self._blocked:
-                self._answer(DONE)
         return True
 
     def _carry_out(self, command: int) -> None:
-        if command not in COMMANDS:
+        if command not in self._commands:
             raise ProgramError(f"command {command} is not emulated")
-        COMMANDS[command](self)
+        self._commands[command]()
+        self._executing = True
+        if not self._stopping:
+            self._answer(DONE)
+
+    def _servo(self) -> None:
+        """Whenever the script reads a set-point; the arm goes on to one that stays what it was."""
+        numbers = self._numbers(11)
+        if numbers != self._set_point:
+            self._set_point = numbers
+            *pose, _, _, _, lookahead, gain = numbers
+            self._arm.follow(np.array(pose), lookahead, gain)
+
+    def _servo_stop(self) -> None:
+        self._set_point, self._stopping = [], True
+        self._arm.stop(PROGRAM_STOP_RATE)
+
+    def _set_payload(self) -> None:
+        mass, *centre = self._numbers(4)
+        self._machine.set_payload(mass, tuple(centre))
+
+    def _set_tcp(self) -> None:
+        offset = self._pose()
+        if not np.isfinite(offset).all():
+            raise ProgramError(f"TCP offset {offset.tolist()} is not finite")
+        self._arm.mount(offset)
+
+    @property
+    def _arm(self) -> KinematicArm:
+        return self._machine.arm
+
+    @property
+    def _registers(self) -> Registers:
+        return self._machine.registers
+
+    def _pose(self) -> np.ndarray:
+        return np.array(self._numbers(6))
+
+    def _numbers(self, count: int) -> list[float]:
+        return self._registers.doubles(self._offset, count)
 
     def _answer(self, value: int) -> None:
-        self.registers.output_ints[self.script.offset] = value
+        self._registers.output_ints[self._offset] = value
 
-    def number(self, index: int) -> float:
-        return self.numbers(index, 1)[0]
+    def _give(self, values: np.ndarray) -> None:
+        """Result of a command, six numbers."""
+        for index, value in enumerate(values, self._offset):
+            self._registers.output_doubles[index] = float(value)
 
-    def numbers(self, first: int, count: int = 6) -> list[float]:
-        return self.registers.doubles(self.script.offset + first, count)
-
-    def integer(self, index: int) -> int:
-        return self.registers.integer(self.script.offset + index)
-
-    def give(self, values: Numbers) -> None:
-        """Result of a command, one number or six."""
-        for index, value in enumerate(values, self.script.offset):
-            self.registers.output_doubles[index] = float(value)
-
-    def give_integer(self, value: int) -> None:
-        self.registers.output_ints[self.script.offset + 1] = int(value)
-
-    def report(self, progress: int) -> None:
-        """Write the progress register: 0 begins a new operation, a negative number ends it."""
-        self._writes = 0 if self._writes >= _LONGEST else self._writes + 1
-        if progress == 0:
-            self._operation = 0 if self._operation >= _LONGEST else self._operation + 1
-        value = (self._writes << 16) + (self._operation << 24)
-        if progress >= 0:
-            value += _RUNNING + min(progress, _RUNNING - 1)
-        self.registers.output_ints[self.script.offset + 2] = value
-
-    def end_move(self) -> None:
-        """Kill the thread of an asynchronous move; the arm brakes when something else begins."""
-        self._path = ()
-        if self.thread == "move":
-            self.thread = None
-            self.report(-1)
-
-    def end_thread(self, thread: Thread) -> None:
-        """Kill a thread of the script, if it runs."""
-        if self.thread == thread:
-            self.thread = None
-        self.latest = ()
-
-    def begin(
-        self,
-        plans: list[Plan],
-        thread: Thread | None,
-        *,
-        brake: float | None = None,
-        path: tuple[Waypoint, ...] = (),
-    ) -> None:
-        """Move the arm in a thread, or with None in the script itself, which then waits.
-
-        Args:
-            plans: Motions, one after the other.
-            thread: Who moves the arm.
-            brake: The arm comes to rest first, at this rate [rad/s2]; None: goes on from its speed.
-            path: Waypoints whose progress is reported, one for each plan.
-
-        Raises:
-            ProgramError: Another thread moves the arm.
-        """
-        if self.thread not in (None, thread):
-            raise ProgramError(f"the {self.thread} thread is already controlling the robot")
-        self._path, self._reported = path, -1
-        self.arm.begin(plans, brake=brake)
-        self.thread = thread
-        self._blocked = thread is None
-        if thread in ("move", "stop"):
-            self.report(0)
-
-    def _watch_path(self) -> None:
-        """Report the waypoints that the arm has set out for."""
-        while self._path and self._reported < min(self.arm.index, len(self._path) - 1):
-            self._reported += 1
-            progress = self._path[self._reported].progress
-            if progress is not None:
-                self.report(progress)
+    def _give_integer(self, value: int) -> None:
+        self._registers.output_ints[self._offset + 1] = int(value)

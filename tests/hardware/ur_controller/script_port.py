@@ -2,7 +2,7 @@
 
 from .controller import Controller
 from .network import Connection
-from .script import take
+from .program import take_script
 
 MAX_SCRIPT_SIZE = 1 << 20  # bytes; a script without an end
 
@@ -15,7 +15,7 @@ class ScriptSession:
         self._controller = controller
 
     def received(self) -> None:
-        while (text := take(self._connection.inbox)) is not None:
+        while (text := take_script(self._connection.inbox)) is not None:
             self._controller.load(text)
         if len(self._connection.inbox) > MAX_SCRIPT_SIZE:
             self._connection.closing = True

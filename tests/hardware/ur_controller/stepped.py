@@ -19,18 +19,24 @@ from .controller import Options
 from .loop import ControllerServer
 from .network import RTDE, SCRIPT
 from .process import free_address
+from .program import (
+    DONE,
+    READY,
+    SERVO_L,
+    SERVO_STOP,
+    SET_PAYLOAD,
+    SET_TCP,
+    SET_WATCHDOG,
+    STOP_SCRIPT,
+    TCP_OFFSET,
+    WITHIN_LIMITS,
+)
 
 ANSWER_TIMEOUT = 10.0  # s of this computer's clock; the emulator answers in this thread
 
 REGISTER_OFFSET = 24  # of the control script's registers, as in ur_rtde
-READY, DONE = 1, 2
 OVER = object()  # of a command of which no step is left
-SERVO_L, SERVO_STOP, SET_PAYLOAD, SET_TCP = 24, 16, 17, 29
-SET_WATCHDOG, WITHIN_LIMITS, TCP_OFFSET, STOP_SCRIPT = 35, 36, 40, 255
-SCRIPT_TEXT = (
-    f"def rtde_control():\n# int register offset\n{REGISTER_OFFSET}\n"
-    "# inject move path\n\tend\nend\n"
-)
+SCRIPT_TEXT = f"def rtde_control():\n# int register offset\n{REGISTER_OFFSET}\nend\n"
 INPUT_FIELDS = [
     f"input_int_register_{REGISTER_OFFSET}",
     *(f"input_double_register_{REGISTER_OFFSET + i}" for i in range(18)),

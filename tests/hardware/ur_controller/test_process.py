@@ -8,6 +8,7 @@ import time
 
 import pytest
 from bolfi_liquids.hardware.errors import RigError
+from bolfi_liquids.hardware.robot.ur import RTDE_FIELDS
 from ur_controller.process import FOLDER, ControllerProcess
 
 HOME = [0.3, -1.4, 1.6, -1.7, -1.5, 0.2]
@@ -83,13 +84,14 @@ def test_it_needs_at_most_a_quarter_of_a_core():
     rtde_control = pytest.importorskip("rtde_control")
     rtde_receive = pytest.importorskip("rtde_receive")
     with ControllerProcess.start(joints=HOME) as emulator:
-        receive = rtde_receive.RTDEReceiveInterface(emulator.address)
+        receive = rtde_receive.RTDEReceiveInterface(emulator.address, 125.0, RTDE_FIELDS)
         control = rtde_control.RTDEControlInterface(emulator.address)
-        control.speedL([0, 0, 0.02, 0, 0, 0], 0.5)
+        pose = receive.getActualTCPPose()
         before = processor_time(emulator.pid)
-        for _ in range(150):
-            control.speedL([0, 0, 0.02, 0, 0, 0], 0.5)
-            time.sleep(0.02)
+        for _ in range(375):
+            pose[2] += 0.02 * 0.008
+            control.servoL(pose, 0.5, 0.5, 0.008, 0.1, 300)
+            time.sleep(0.008)
         assert processor_time(emulator.pid) - before < 0.25 * 3.0
         assert "late" not in emulator.notes()
         del control, receive

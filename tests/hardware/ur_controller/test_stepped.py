@@ -4,7 +4,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware.motion.kinematics import inverse
 from bolfi_liquids.hardware.robot.ur import RTDE_FIELDS
 from stepped_clock import SteppedClock
 from ur_controller.controller import MODELS
@@ -91,7 +90,7 @@ def test_the_watchdog_ends_the_program_after_its_period(control, clock, emulator
     assert f"not written for {1 / frequency:.3f} s" in emulator.controller.reason
     assert time_to(clock, lambda: emulator.controller.snapshot.resting) < 0.1
     clock.sleep(1.0)
-    assert emulator.controller.arm.started == 1
+    assert emulator.controller.started == 1
 
 
 def test_without_a_watchdog_the_program_goes_on(control, clock, emulator):
@@ -110,7 +109,7 @@ def test_the_watchdog_goes_on_behind_a_frozen_link_and_what_comes_late_moves_not
     assert time_to(clock, lambda: emulator.controller.snapshot.resting) < 0.25
     clock.sleep(1.0)
     assert "watchdog" in emulator.controller.reason
-    assert emulator.controller.arm.started == 1
+    assert emulator.controller.started == 1
 
 
 def test_a_protective_stop_is_unlocked_after_its_time_and_nothing_resumes(control, clock, emulator):
@@ -123,7 +122,7 @@ def test_a_protective_stop_is_unlocked_after_its_time_and_nothing_resumes(contro
     assert 4.8 < waited <= 5.0
     clock.sleep(1.0)
     assert (controller.snapshot.safety_bits, controller.snapshot.runtime_state) == (1, 1)
-    assert controller.arm.started == 1
+    assert controller.started == 1
 
 
 def test_a_frozen_link_keeps_its_last_value_and_looks_sound(receive, clock, emulator):
@@ -173,22 +172,3 @@ def test_set_points_on_a_circle_are_followed(control, clock, emulator):
     # it lags by what it looks ahead
     lag = np.linalg.norm(np.array(rows[-1]) - (start + turned)[:3]) / speed
     assert lag == pytest.approx(0.03, abs=2 * DT)
-
-
-def test_the_speed_slider_slows_the_arm_down(control, clock, emulator):
-    emulator.controller.registers.slider = 0.25
-    goal = np.array(emulator.controller.snapshot.pose) + [0, 0, 0.02, 0, 0, 0]
-    joints = inverse(emulator.controller.arm.mounted.arm, goal, HOME, tcp=np.zeros(6)).joints
-    control.servoL(goal.tolist(), 0.5, 0.5, DT, 0.1, 300)
-    slow = time_to(clock, lambda: near(emulator, joints))
-    assert emulator.controller.snapshot.scaling == 0.25
-    emulator.controller.registers.slider = 1.0
-    emulator.controller.arm.place(np.array(HOME))
-    clock.sleep(DT)
-    control.servoL((goal + 1e-9).tolist(), 0.5, 0.5, DT, 0.1, 300)
-    fast = time_to(clock, lambda: near(emulator, joints))
-    assert slow == pytest.approx(4.0 * fast, abs=6 * DT)
-
-
-def near(emulator, joints):
-    return np.abs(np.array(emulator.controller.snapshot.joints) - joints).max() < 1e-3

@@ -2,27 +2,21 @@ import struct
 
 import pytest
 from ur_controller import fields, wire
-from ur_controller.registers import Registers
+from ur_controller.program import take_script
 from ur_controller.snapshot import Snapshot
 
 SNAPSHOT = Snapshot(
     time=1.25,
     host=0.0,
     joints=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0),
-    joint_speeds=(0.0,) * 6,
     pose=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6),
     velocity=(0.0,) * 6,
     force=(0.0,) * 6,
     runtime_state=2,
-    safety_mode=1,
     safety_bits=1,
     robot_bits=3,
-    slider=1.0,
-    scaling=1.0,
     payload=0.5,
     payload_centre=(0.0, 0.0, 0.1),
-    digital_outputs=5,
-    analog_outputs=(0.25, 0.75),
     output_ints=tuple(range(48)),
     output_doubles=tuple(0.5 * i for i in range(48)),
     resting=True,
@@ -61,25 +55,17 @@ def test_a_recipe_keeps_the_client_s_order():
 
 
 def test_fields_depend_on_the_controller():
-    assert fields.find("ft_raw_wrench", (3, 15)) is None
-    assert fields.find("ft_raw_wrench", (5, 8)) is None
-    assert fields.find("ft_raw_wrench", (5, 11)) is not None
-    assert fields.find("payload_inertia", (3, 15)) is not None
+    assert fields.find("payload_cog", (3, 15)) is not None
+    assert fields.find("payload_cog", (5, 5)) is None
+    assert fields.find("payload_cog", (5, 11)) is not None
     assert fields.find("no_such_field", (5, 11)) is None
 
 
-def test_inputs_set_the_slider_and_masked_outputs():
-    registers = Registers()
-    registers.write({"speed_slider_mask": 0, "speed_slider_fraction": 0.1})
-    assert registers.slider == 1.0
-    registers.write({"speed_slider_mask": 1, "speed_slider_fraction": 1.7})
-    assert registers.slider == 1.0
-    registers.write({"speed_slider_mask": 1, "speed_slider_fraction": 0.5})
-    assert registers.slider == 0.5
-    registers.write({"standard_digital_output_mask": 6, "standard_digital_output": 4})
-    registers.write({"standard_digital_output_mask": 1, "standard_digital_output": 1})
-    registers.write({"tool_digital_output_mask": 2, "tool_digital_output": 2})
-    assert registers.digital_outputs == 0b101 | 2 << 16
-    mask = {"standard_analog_output_mask": 2}
-    registers.write({**mask, "standard_analog_output_0": 0.9, "standard_analog_output_1": 0.3})
-    assert registers.analog_outputs == [0.0, 0.3]
+def test_scripts_come_whole_and_one_after_the_other():
+    text = b"def rtde_control():\n# int register offset\n24\n    thread x():\n    end\nend\n"
+    buffer = bytearray(text[:40])
+    assert take_script(buffer) is None
+    buffer += text[40:] + b"def other():\nend\nrest"
+    assert take_script(buffer) == text.decode()
+    assert take_script(buffer) == "def other():\nend\n"
+    assert bytes(buffer) == b"rest"

@@ -9,16 +9,11 @@ VERSION, CONTROLLER, TEXT, DATA = b"VvMU"
 OUTPUTS, INPUTS, START, PAUSE = b"OISP"
 
 PACKAGE_TYPES = {
-    "BOOL": "?",
-    "UINT8": "B",
     "UINT32": "I",
-    "UINT64": "Q",
     "INT32": "i",
     "DOUBLE": "d",
     "VECTOR3D": "3d",
     "VECTOR6D": "6d",
-    "VECTOR6INT32": "6i",
-    "VECTOR6UINT32": "6I",
 }
 
 

@@ -51,7 +51,7 @@ def marker_series(camera, noise: float, seed: int = 0, delay: float = DELAY) -> 
     pixels += rng.normal(0.0, noise, pixels.shape)
     nothing = np.full(len(exposed), np.nan)
     flags = np.zeros(len(exposed), int)
-    return FrameSeries(exposed + delay, pixels, ViewLines(*[nothing] * 4), flags)
+    return FrameSeries(exposed + delay, pixels, ViewLines(*[nothing] * 4, flags))
 
 
 @pytest.mark.parametrize("rate", [125.0, 30.0])

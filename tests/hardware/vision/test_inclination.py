@@ -32,7 +32,9 @@ def lines_of(camera, inclinations, pivots) -> ViewLines:
         angle.append(np.arctan(slope))
         offset.append((x / z - slope * y / z)[0])
     error = np.full(len(angle), ERROR)
-    return ViewLines(np.array(angle), np.array(offset), error, error / 10)
+    return ViewLines(
+        np.array(angle), np.array(offset), error, error / 10, np.zeros(len(angle), int)
+    )
 
 
 @pytest.fixture
@@ -125,16 +127,16 @@ def test_interpolation_is_exact_for_cubics_and_passes_over_flagged_frames():
     frames[25] = frame(25, stamps[25], cubic(stamps[25]), Flag.NO_MARKER)
     wanted = np.linspace(stamps[3], stamps[-4], 200)
     found = interpolate_lines(as_series(frames), wanted)
-    np.testing.assert_allclose(found.lines.angle, cubic(wanted), atol=1e-9)
-    np.testing.assert_allclose(found.lines.offset, 0.1 * cubic(wanted), atol=1e-9)
+    np.testing.assert_allclose(found.angle, cubic(wanted), atol=1e-9)
+    np.testing.assert_allclose(found.offset, 0.1 * cubic(wanted), atol=1e-9)
     assert (found.flags == 0).all()
 
 
 def test_at_a_frame_its_own_value_and_error_return():
     series = as_series([frame(k, k / 30, cubic(k / 30)) for k in range(10)])
     found = interpolate_lines(series, series.stamp)
-    np.testing.assert_allclose(found.lines.angle, series.lines.angle)
-    np.testing.assert_allclose(found.lines.angle_error, ERROR)
+    np.testing.assert_allclose(found.angle, series.lines.angle)
+    np.testing.assert_allclose(found.angle_error, ERROR)
 
 
 def test_errors_between_frames_are_those_of_many_draws():
@@ -144,14 +146,14 @@ def test_errors_between_frames_are_those_of_many_draws():
         noise = rng.normal(0, ERROR, 12)
         series = as_series([frame(k, t, noise[k]) for k, t in enumerate(stamps)])
         found = interpolate_lines(series, wanted)
-        drawn.append(found.lines.angle)
-    np.testing.assert_allclose(np.std(drawn, axis=0), found.lines.angle_error, rtol=0.12)
+        drawn.append(found.angle)
+    np.testing.assert_allclose(np.std(drawn, axis=0), found.angle_error, rtol=0.12)
 
 
 def test_long_gaps_and_times_outside_have_no_value_but_a_reason():
     frames = [frame(k, k / 30, 0.1, Flag.FEW_ROWS if 10 <= k < 14 else 0) for k in range(30)]
     found = interpolate_lines(as_series(frames), np.array([-0.1, 0.2, 12 / 30, 0.9, 1.5]))
-    np.testing.assert_array_equal(np.isnan(found.lines.angle), [True, False, True, False, True])
+    np.testing.assert_array_equal(np.isnan(found.angle), [True, False, True, False, True])
     assert found.flags[[1, 3]].tolist() == [0, 0]
     assert Flag(int(found.flags[2])) == Flag.GAP | Flag.FEW_ROWS
     assert Flag.GAP in Flag(int(found.flags[0])) and Flag.GAP in Flag(int(found.flags[4]))
@@ -161,7 +163,7 @@ def test_long_gaps_and_times_outside_have_no_value_but_a_reason():
 def test_no_frames_give_no_values(count):
     frames = [frame(k, k / 30, 0.1) for k in range(count)]
     found = interpolate_lines(as_series(frames), np.array([0.0, 0.1]))
-    assert np.isnan(found.lines.angle).all()
+    assert np.isnan(found.angle).all()
     assert (found.flags == Flag.GAP).all()
 
 

@@ -9,9 +9,7 @@ from bolfi_liquids.hardware.rendering import (
     Look,
     WorldState,
     direction,
-    fault_of,
     prepare,
-    render,
 )
 from bolfi_liquids.hardware.vision import (
     CameraModel,
@@ -22,11 +20,13 @@ from bolfi_liquids.hardware.vision import (
     line_is_good,
     measure,
 )
+from rendered_faults import fault_of, render_with
+from rendered_refraction import refracted
 from rendered_scenes import CLEAN, rehearsal_camera, rehearsal_scene, stick_view
 
 cv2 = pytest.importorskip("cv2")
 
-FAULTLESS = dataclasses.replace(Look(), faults=0.0)
+FAULTLESS = Look()
 BENT = (-0.12, 0.05, 0.001, -0.001, 0.0)
 
 
@@ -43,7 +43,13 @@ class Bench:
 
     def picture(self, inclination_deg, pivot=(0.0, 0.0, 0.235), fault=None) -> np.ndarray:
         state = WorldState(0.0, np.array(pivot), np.radians(inclination_deg))
-        return render(self.stage, [state] * 3, self.rng, fault)
+        return render_with(fault, self.stage, [state] * 3, self.rng)
+
+    def refracted(self, inclination_deg, pivot=(0.0, 0.0, 0.235)) -> np.ndarray:
+        """With the stick in the liquid, as it is seen through the cup's wall."""
+        return refracted(
+            self.stage, WorldState(0.0, np.array(pivot), np.radians(inclination_deg)), self.rng
+        )
 
     def truth(self, inclination_deg, pivot=(0.0, 0.0, 0.235)) -> float:
         """Angle [rad] of the stick's axis in the picture: of two of its points, by pinhole."""
@@ -66,7 +72,7 @@ def random_pose(rng, most_deg: float):
         (CLEAN, (0.0,) * 5, 0.005),
         (FAULTLESS, (0.0,) * 5, 0.03),
         (FAULTLESS, BENT, 0.03),
-        (dataclasses.replace(BRIGHT_STICK, faults=0.0), (0.0,) * 5, 0.03),
+        (BRIGHT_STICK, (0.0,) * 5, 0.03),
     ],
 )
 def test_the_angle_is_right_to_some_hundredths_of_a_degree(view, look, distortion, most):
@@ -109,7 +115,7 @@ def test_standard_errors_are_as_large_as_the_errors(read_noise):
 @pytest.mark.parametrize("pose", [((7.0, 0.0), (0.0, 0.0, 0.235)), ((0.0, 0.0), (0.012, 0, 0.235))])
 def test_refraction_below_the_surface_does_not_reach_the_line(pose):
     bench = Bench(CLEAN)
-    image, truth = bench.picture(*pose), bench.truth(*pose)
+    image, truth = bench.refracted(*pose), bench.truth(*pose)
     assert abs(np.degrees(plain_fit(image, 130, 410) - truth)) > 0.5
     assert abs(np.degrees(bench.measure(image).angle - truth)) < 0.005
 
@@ -118,7 +124,7 @@ def test_without_the_mask_a_deep_liquid_would_bend_the_line():
     bench = Bench(CLEAN)
     scene = dataclasses.replace(bench.scene, fill=0.13, cup_height=0.15)
     bench.stage, bench.view = prepare(scene, bench.camera, CLEAN), stick_view(scene, bench.camera)
-    image, truth = bench.picture((5.0, 0.0)), bench.truth((5.0, 0.0))
+    image, truth = bench.refracted((5.0, 0.0)), bench.truth((5.0, 0.0))
     blind = dataclasses.replace(bench.view, surface_height=0.0)
     bent = measure(Frame(0, 0.0, image), blind, Track())[0]
     masked = bench.measure(image)
@@ -254,7 +260,7 @@ def gross_errors(frames: int, seed: int) -> tuple[float, float, float, float]:
             amplitude = 45.0 if k % 1000 > 800 else 12.0  # mostly as when stirring
             inclination = amplitude * np.sin(2 * np.pi * np.array([0.31, 0.47]) * k / 30 + phase)
             pivot = (*(0.025 * np.sin([0.11 * k, 0.13 * k])), 0.235)
-            fault = fault_of(k, 0.1, bench.stage.area, seed + number)
+            fault = fault_of(k, 0.1, bench.stage, seed + number)
             frame = Frame(k, k / 30, bench.picture(inclination, pivot, fault))
             found = meter.measure(frame)
             if line_is_good(found.flags):

@@ -1,14 +1,35 @@
-"""What goes wrong in a picture: a hand or a hose in the way, glare, noise."""
+"""What goes wrong in a rendered picture: a hand or a hose in the way, glare."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import NamedTuple
 
+import cv2
 import numpy as np
-
-from ..vision.opencv import opencv
-from .coverage import PixelWindow
+from bolfi_liquids.hardware.rendering.coverage import PixelWindow, window_around
+from bolfi_liquids.hardware.rendering.drawing import Stage, develop, draw
+from bolfi_liquids.hardware.rendering.world import WorldState
 
 FRAMES_PER_FAULT = 3  # what gets in the way stays for a tenth of a second
+
+
+def stick_area(stage: Stage) -> PixelWindow:
+    """Where the stick may be."""
+    reach = stage.scene.cup_radius * 1.2
+    corners = [[x, y, z] for x in (-reach, reach) for y in (-reach, reach) for z in (0.03, 0.26)]
+    return window_around(stage.camera.project(np.array(corners)), stage.camera.size)
+
+
+def render_with(
+    fault: "Fault | None",
+    stage: Stage,
+    exposures: Sequence[WorldState],
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """A picture as `render` makes it, with a fault in it where there is one."""
+    image = draw(stage, exposures)
+    if fault is not None:
+        draw_fault(image, fault)
+    return develop(stage, image, rng)
 
 
 class Fault(NamedTuple):
@@ -29,13 +50,13 @@ class Fault(NamedTuple):
     grey: float
 
 
-def fault_of(index: int, share: float, area: PixelWindow, seed: int) -> Fault | None:
+def fault_of(index: int, share: float, stage: Stage, seed: int) -> Fault | None:
     """The fault in frame `index`, None for most; the same seed gives the same faults.
 
     Args:
         index: Of the frame.
         share: Of frames with a fault.
-        area: Where the stick may be; faults are centred there.
+        stage: Faults are centred where its stick may be.
         seed: Of this camera.
     """
     rng = np.random.default_rng((seed, index // FRAMES_PER_FAULT))
@@ -43,6 +64,7 @@ def fault_of(index: int, share: float, area: PixelWindow, seed: int) -> Fault | 
         return None
     kind = ("hand", "hose", "glare")[rng.integers(3)]
     low, high = {"hand": (25.0, 70.0), "hose": (6.0, 24.0), "glare": (10.0, 50.0)}[kind]
+    area = stick_area(stage)
     return Fault(
         kind,
         (rng.uniform(area.left, area.right), rng.uniform(area.top, area.bottom)),
@@ -57,7 +79,6 @@ def draw_fault(image: np.ndarray, fault: Fault) -> None:
     if fault.kind == "glare":
         _draw_glare(image, fault)
         return
-    cv2 = opencv()
     along = np.array([np.cos(fault.angle), np.sin(fault.angle)])
     place = np.array(fault.place)
     far = float(sum(image.shape))
@@ -78,40 +99,3 @@ def _draw_glare(image: np.ndarray, fault: Fault) -> None:
     light = 600.0 * np.exp(-np.add.outer(y * y, x * x) * np.float32(1.0 / fault.size**2))
     part = image[top:bottom, left:right]
     part[...] = np.minimum(part + light, 255.0).astype(np.uint8)
-
-
-@dataclass(frozen=True, eq=False)
-class PixelNoise:
-    """Read and shot noise from a pool of normal numbers, cut out at a random place each time.
-
-    Attributes:
-        pool: Standard normal, float32, larger than the picture.
-        strength: Standard deviation at each grey level, float32, shape (256,).
-    """
-
-    pool: np.ndarray
-    strength: np.ndarray
-
-    def add(self, image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """A noisy copy of a picture."""
-        cv2 = opencv()
-        height, width = image.shape
-        top = int(rng.integers(self.pool.shape[0] - height + 1))
-        left = int(rng.integers(self.pool.shape[1] - width + 1))
-        field = self.pool[top : top + height, left : left + width]
-        noisy = cv2.multiply(cv2.LUT(image, self.strength), field)
-        return cv2.add(image, noisy, dtype=cv2.CV_8U)
-
-
-def noise_pool(size: tuple[int, int], read: float, shot: float, seed: int) -> PixelNoise:
-    """Prepare noise for pictures of `size` (width, height).
-
-    Args:
-        size: Of the pictures [px].
-        read: Standard deviation at grey level 0.
-        shot: Variance per grey level.
-        seed: Of the pool.
-    """
-    rng = np.random.default_rng(seed)
-    pool = rng.standard_normal((size[1] + 397, size[0] + 499), dtype=np.float32)
-    return PixelNoise(pool, np.sqrt(read**2 + shot * np.arange(256)).astype(np.float32))
