@@ -114,35 +114,30 @@ def check_baseline(stirring: StirSimulator, baseline: Sequence[Recording]) -> No
 
 
 def usual_for(
-    stirring: StirSimulator, clean: Sequence[Clean], viscosity: float | None
+    stirring: StirSimulator,
+    clean: Sequence[Clean],
+    viscosity: float | None,
+    *,
+    elsewhere: bool = False,
 ) -> "UsualResidual | None":
-    """What is usual for an experiment on a liquid [Pa s]; None where nothing is known to be.
+    """Usual error of the simulator at a viscosity [Pa s]; None without clean recordings.
 
-    A clean recording of the same path, of a liquid like this one, shows where on it the simulator
-    errs.
+    Args:
+        stirring: The simulator, and what was recorded.
+        clean: One of the same path, of a liquid like this one, shows where on it the simulator
+            errs.
+        viscosity: None where it is not known.
+        elsewhere: Whether it is for a path of which there is no clean recording.
     """
-    only = stirring.recordings[0] if len(stirring.recordings) == 1 else None
-    same = [only is not None and same_experiment(one.recording, only) for one in clean]
-    return _usual(clean, same, viscosity, stirring.least_viscosity)
-
-
-def usual_elsewhere(
-    stirring: StirSimulator, clean: Sequence[Clean], viscosity: float | None
-) -> "UsualResidual | None":
-    """What is usual on paths of which there is no clean recording; None if there is none at all."""
-    return _usual(clean, [False] * len(clean), viscosity, stirring.least_viscosity)
-
-
-def _usual(
-    clean: Sequence[Clean], same: list[bool], viscosity: float | None, least: float
-) -> "UsualResidual | None":
     from ..inference.criticism import KnownNoise, usual_residual
 
     if not clean:
         return None
+    only = stirring.recordings[0] if len(stirring.recordings) == 1 and not elsewhere else None
+    same = [only is not None and same_experiment(one.recording, only) for one in clean]
     # the whole recording tells white noise better than the short rest tells correlated noise
     noises = [KnownNoise(sensor_noise(one.recording.inclination)) for one in clean]
-    away = apart([one.viscosity for one in clean], viscosity, least)
+    away = apart([one.viscosity for one in clean], viscosity, stirring.least_viscosity)
     return usual_residual([one.residual for one in clean], noises, same, away)
 
 

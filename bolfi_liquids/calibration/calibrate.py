@@ -27,7 +27,7 @@ from ..progress import Advance, after_first, progress_bar
 from ..run.compute import open_compute
 from ..run.given_pours import keep_pours
 from ..run.provenance import versions
-from ..run.recordings import check_names, keep_recordings
+from ..run.recordings import keep_recordings
 from ..run.run import RUN_TOML, Run
 from ..run.simulations import warn_of_failures
 from ..simulators import StirSimulator, stir_simulator
@@ -123,7 +123,6 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     if prior is not None:
         check_prior(prior)
     stirring = stir_simulator(opened, settings.particles)
-    check_names(stirring.recordings)
     clean = _open_clean(baseline, stirring, surrogate)
     path = (
         Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
@@ -132,7 +131,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     inputs = CalibrationInputs(settings, prior, stirring, clean)
     with (
         open_compute(executor, timeout) as compute,
-        Run.begun(path, inputs.record(timeout), resume=resume, growing="settings.budget") as run,
+        Run.begun(path, inputs.record, resume=resume, growing="settings.budget") as run,
     ):
         keep_recordings(path, stirring.recordings)
         if table is not None:
@@ -161,7 +160,8 @@ class CalibrationInputs:
     stirring: StirSimulator
     clean: tuple[Recording, ...] = ()
 
-    def record(self, timeout: float | None = None) -> dict[str, Any]:
+    @property
+    def record(self) -> dict[str, Any]:
         """Content of run.toml: settings, inputs, versions; see `run.run.MUST_AGREE`."""
         from ..inference.engine_version import ENGINE_VERSION
 
@@ -177,8 +177,6 @@ class CalibrationInputs:
             },
             "files": {"recordings": [recording.path.name for recording in recordings]},
             "versions": versions(),
-            # runs may go on with another limit, but it decides which simulations were given up
-            **({} if timeout is None else {"timeouts": [float(timeout)]}),
         }
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..calibration.baseline import Clean, clean_residuals, usual_elsewhere, usual_for
+from ..calibration.baseline import Clean, clean_residuals, usual_for
 from ..calibration.result import Calibration
 from ..calibration.stirs import camera_noise, effects_of, held_out_noise, stir_experiment
 from ..errors import Argument, InputError
@@ -158,7 +158,9 @@ def _stirs(
         extensions,
         earlier=_learned_from(calibration),
         held_out=[_kept_back(one, stirring, clean, viscosity) for one in inputs.held_out],
-        proposals=stir_proposals(stirring, cameras, usual_elsewhere(stirring, clean, viscosity)),
+        proposals=stir_proposals(
+            stirring, cameras, usual_for(stirring, clean, viscosity, elsewhere=True)
+        ),
         accept=_among(settings.accept, extensions),
         plan=settings.stir_plan,
         **how,

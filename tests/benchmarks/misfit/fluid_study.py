@@ -14,7 +14,6 @@ import time
 import warnings
 from functools import cache
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 import numpyro.distributions as dist
@@ -156,9 +155,7 @@ def _record(path: str, truth: dict, rng: np.random.Generator) -> Recording:
 def _recording(path: str, inclination: np.ndarray) -> Recording:
     gripper = Trajectory(*PATHS[path])
     label = f"{path}-{hash(inclination.tobytes())}"
-    return Recording(
-        gripper.time, gripper, inclination, MappingProxyType(RIG), Path(f"{path}.nc"), label
-    )
+    return Recording(gripper.time, gripper, inclination, RIG, Path(f"{path}.nc"), label)
 
 
 @cache

@@ -288,7 +288,7 @@ def test_warnings_of_stirs_that_are_cut_too_roughly():
 
 
 def test_warnings_of_a_wrong_frame_and_of_a_bad_fit(calibration):
-    from bolfi_liquids.calibration.bad_fit import bad_fit
+    from bolfi_liquids.calibration.summary import bad_fit
     from bolfi_liquids.inputs.bundled import bundled_recording
     from bolfi_liquids.inputs.frame import frame_warnings
 
