@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import Argument, InputError
 from ..files import given_path
-from ..inputs.frame import frame_warnings
+from ..inputs.frame import recording_warnings
 from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import Pours, table_and_cups
 from ..inputs.prior import check_prior, default_prior, describe_prior, read_prior
-from ..inputs.recording import Recording, recording_warnings
+from ..inputs.recording import Recording
 from ..inputs.settings import (
     CalibrationSettings,
     CriticismSettings,
@@ -31,9 +31,21 @@ from ..run.recordings import keep_recordings
 from ..run.run import RUN_TOML, Run
 from ..run.simulations import warn_of_failures
 from ..simulators import StirSimulator, stir_simulator
-from .baseline import CLEAN_RUNS, Clean, check_baseline, clean_residuals
-from .engine_fit import confirmed, fit_recordings
-from .model_error import model_error, noise_beside
+from .engine_fit import (
+    PREDICTIVE_DRAWS,
+    THETA_STAR_REPLICATES,
+    check_of,
+    confirmed,
+    fit_recordings,
+)
+from .model_error import (
+    CLEAN_RUNS,
+    Clean,
+    check_baseline,
+    clean_residuals,
+    model_error,
+    noise_beside,
+)
 from .result import Calibration
 from .stirs import camera_noise, effects_of
 from .summary import CalibrationSummary
@@ -137,7 +149,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         if table is not None:
             keep_pours(path, table, made_with)
             run.write_summary()
-        for notice in [*recording_warnings(opened), *frame_warnings(opened)]:
+        for notice in recording_warnings(opened):
             logger.warning(notice)
         if run.result("calibrate") is None:
             _calibrate(run, inputs, compute, progress)
@@ -182,7 +194,6 @@ class CalibrationInputs:
 
 def _calibrate(run: Run, inputs: CalibrationInputs, compute: "Compute", progress: bool) -> None:
     """Search, confirm, judge, and keep the result in the run."""
-    from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES, check_of
     from .posterior_file import results_tree
 
     settings, stirring = inputs.settings, inputs.stirring

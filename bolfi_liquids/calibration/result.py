@@ -128,7 +128,7 @@ class Calibration:
         """
         self._check_plot("plot_residuals")
         from ..drawing import shown
-        from .fit_figures import draw_fit
+        from .figures import draw_fit
 
         return shown(partial(draw_fit, self.tree), axes)
 
@@ -146,7 +146,7 @@ class Calibration:
         """
         self._check_plot("plot_coefficient")
         from ..drawing import shown
-        from .posterior_figure import draw_posterior
+        from .figures import draw_posterior
 
         return shown(partial(draw_posterior, self.tree), ax)
 
@@ -160,7 +160,7 @@ class Calibration:
             The axes.
         """
         from ..drawing import shown
-        from .search_figure import draw_search
+        from .figures import draw_search
 
         return shown(partial(draw_search, self.tree), axes)
 

@@ -16,7 +16,7 @@ from ..models import stirring_error
 from ..run.summary import Number, Section
 from ..simulators import StirSimulator
 from ..wording import with_unit
-from .check import PosteriorCheck
+from .engine_fit import PosteriorCheck
 from .model_error import ModelError
 from .noise import irreducible_rms, rms
 

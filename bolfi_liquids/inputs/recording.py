@@ -1,7 +1,7 @@
 """A recording of a stir, and the variables of its file."""
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -114,19 +114,6 @@ def _told(name: str, value: float | str) -> str:
     if name in LENGTHS:
         return f"{name.partition('_')[2] or name} {100.0 * value:.3g} cm"
     return f"{value:.4g} {ATTRIBUTE_UNITS.get(name, '')}".strip()
-
-
-def recording_warnings(recordings: Iterable[Recording]) -> list[str]:
-    """A warning for each recording that something stopped, and for each torn value."""
-    warnings = []
-    for one in recordings:
-        if one.attrs.get("status") == "aborted":
-            warnings.append(
-                f"{one.path}: aborted after {one.time[-1] - one.time[0]:.1f} s of stirring "
-                f"({one.attrs.get('reason') or 'no reason given'}); a short stir says little"
-            )
-        warnings += [f"{one.path}: {text}" for text in one.torn]
-    return warnings
 
 
 def recording_dataset(values: Mapping[str, NDArray], attrs: Mapping[str, float | str]) -> "Dataset":

@@ -27,7 +27,7 @@ from bolfi_liquids.inference.simulations import Compute
 from kept import keep, results
 
 from bolfi_liquids import inference, models
-from bolfi_liquids.calibration.baseline import Clean, clean_residuals, usual_for
+from bolfi_liquids.calibration.model_error import Clean, clean_residuals, usual_for
 from bolfi_liquids.calibration.stirs import (
     camera_noise,
     effects_of,

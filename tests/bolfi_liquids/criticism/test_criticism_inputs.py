@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bolfi_liquids.calibration.baseline import Clean, apart, usual_for
+from bolfi_liquids.calibration.model_error import Clean, apart, usual_for
 from bolfi_liquids.calibration.stirs import camera_noise, held_out_noise, stir_experiment
 from bolfi_liquids.criticism.inputs import ComparedData, check_effects, open_inputs
 from bolfi_liquids.errors import Argument, InputError
