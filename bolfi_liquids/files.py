@@ -56,6 +56,18 @@ def given_path(path: str | Path, where: str) -> Path:
     return given
 
 
+def unused_path(path: str | Path, where: str) -> Path:
+    """A path that a person gave to be written to, and that nothing has.
+
+    Raises:
+        InputError: See `given_path`, or there is something already.
+    """
+    given = given_path(path, where)
+    if given.exists():
+        raise InputError("exists already", where=str(given), fix="choose another name")
+    return given
+
+
 def new_netcdf(path: str | Path) -> Path:
     """`path`, which a person gave to be written.
 
@@ -94,12 +106,6 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
     Returns:
         `path`.
     """
-    return _written(path, write, Path.replace)
-
-
-def _written(
-    path: Path, write: Callable[[Path], object], place: Callable[[Path, Path], object]
-) -> Path:
     temporary = None
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
@@ -107,7 +113,7 @@ def _written(
         temporary = Path(name)
         write(temporary)
         temporary.chmod(0o644)  # mkstemp's own mode hides results from a group
-        place(temporary, path)
+        temporary.replace(path)
     except OSError as err:
         if (why := disk_errno(err)) is None:
             raise
@@ -138,25 +144,3 @@ def write_netcdf(data: "Dataset | DataTree", path: Path) -> Path:
 def write_text(path: Path, text: str) -> Path:
     """Write UTF-8 text by `write_whole`."""
     return write_whole(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
-
-
-def write_new_text(path: Path, text: str) -> Path:
-    """Write UTF-8 text whole, to a file that is not there yet.
-
-    Raises:
-        FileExistsError: It is there, perhaps since a moment; it was left as it is.
-    """
-    return _written(path, lambda temporary: temporary.write_text(text, encoding="utf-8"), _linked)
-
-
-def _linked(temporary: Path, path: Path) -> None:
-    """Give a file its name, unless another has it."""
-    try:
-        path.hardlink_to(temporary)
-    except FileExistsError:
-        raise
-    except OSError as err:
-        if disk_errno(err):
-            raise
-        with path.open("xb") as file:  # a disk without links
-            file.write(temporary.read_bytes())

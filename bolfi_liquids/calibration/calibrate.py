@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import Argument, InputError
 from ..files import given_path
-from ..inputs.frame import frame_warnings
+from ..inputs.frame import recording_warnings
 from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import Pours, table_and_cups
 from ..inputs.prior import check_prior, default_prior, describe_prior, read_prior
-from ..inputs.recording import Recording, recording_warnings
+from ..inputs.recording import Recording
 from ..inputs.settings import (
     CalibrationSettings,
     CriticismSettings,
@@ -27,13 +27,25 @@ from ..progress import Advance, after_first, progress_bar
 from ..run.compute import open_compute
 from ..run.given_pours import keep_pours
 from ..run.provenance import versions
-from ..run.recordings import check_names, keep_recordings
+from ..run.recordings import keep_recordings
 from ..run.run import RUN_TOML, Run
 from ..run.simulations import warn_of_failures
 from ..simulators import StirSimulator, stir_simulator
-from .baseline import CLEAN_RUNS, Clean, check_baseline, clean_residuals
-from .engine_fit import confirmed, fit_recordings
-from .model_error import model_error, noise_beside
+from .engine_fit import (
+    PREDICTIVE_DRAWS,
+    THETA_STAR_REPLICATES,
+    check_of,
+    confirmed,
+    fit_recordings,
+)
+from .model_error import (
+    CLEAN_RUNS,
+    Clean,
+    check_baseline,
+    clean_residuals,
+    model_error,
+    noise_beside,
+)
 from .result import Calibration
 from .stirs import camera_noise, effects_of
 from .summary import CalibrationSummary
@@ -123,7 +135,6 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     if prior is not None:
         check_prior(prior)
     stirring = stir_simulator(opened, settings.particles)
-    check_names(stirring.recordings)
     clean = _open_clean(baseline, stirring, surrogate)
     path = (
         Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
@@ -132,13 +143,13 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     inputs = CalibrationInputs(settings, prior, stirring, clean)
     with (
         open_compute(executor, timeout) as compute,
-        Run.begun(path, inputs.record(timeout), resume=resume, growing="settings.budget") as run,
+        Run.begun(path, inputs.record, resume=resume, growing="settings.budget") as run,
     ):
         keep_recordings(path, stirring.recordings)
         if table is not None:
             keep_pours(path, table, made_with)
             run.write_summary()
-        for notice in [*recording_warnings(opened), *frame_warnings(opened)]:
+        for notice in recording_warnings(opened):
             logger.warning(notice)
         if run.result("calibrate") is None:
             _calibrate(run, inputs, compute, progress)
@@ -161,7 +172,8 @@ class CalibrationInputs:
     stirring: StirSimulator
     clean: tuple[Recording, ...] = ()
 
-    def record(self, timeout: float | None = None) -> dict[str, Any]:
+    @property
+    def record(self) -> dict[str, Any]:
         """Content of run.toml: settings, inputs, versions; see `run.run.MUST_AGREE`."""
         from ..inference.engine_version import ENGINE_VERSION
 
@@ -177,14 +189,11 @@ class CalibrationInputs:
             },
             "files": {"recordings": [recording.path.name for recording in recordings]},
             "versions": versions(),
-            # runs may go on with another limit, but it decides which simulations were given up
-            **({} if timeout is None else {"timeouts": [float(timeout)]}),
         }
 
 
 def _calibrate(run: Run, inputs: CalibrationInputs, compute: "Compute", progress: bool) -> None:
     """Search, confirm, judge, and keep the result in the run."""
-    from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES, check_of
     from .posterior_file import results_tree
 
     settings, stirring = inputs.settings, inputs.stirring

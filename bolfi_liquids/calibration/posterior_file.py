@@ -19,7 +19,7 @@ import numpy as np
 from ..inputs.fields import PLANE_NAMES
 from ..inputs.strokes import stroke_numbers
 from ..simulators import StirSimulator
-from .check import PosteriorCheck
+from .engine_fit import PosteriorCheck
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree

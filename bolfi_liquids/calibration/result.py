@@ -7,13 +7,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from ..run.run import Run, RunOrPath, key_of
+from ..seeds import Phase, generator
 from ..wording import html_table
-from .bad_fit import bad_fit
-from .draws import pick_draws
-from .summary import CalibrationSummary
+from .summary import CalibrationSummary, bad_fit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -128,7 +128,7 @@ class Calibration:
         """
         self._check_plot("plot_residuals")
         from ..drawing import shown
-        from .fit_figures import draw_fit
+        from .figures import draw_fit
 
         return shown(partial(draw_fit, self.tree), axes)
 
@@ -146,7 +146,7 @@ class Calibration:
         """
         self._check_plot("plot_coefficient")
         from ..drawing import shown
-        from .posterior_figure import draw_posterior
+        from .figures import draw_posterior
 
         return shown(partial(draw_posterior, self.tree), ax)
 
@@ -160,7 +160,7 @@ class Calibration:
             The axes.
         """
         from ..drawing import shown
-        from .search_figure import draw_search
+        from .figures import draw_search
 
         return shown(partial(draw_search, self.tree), axes)
 
@@ -174,3 +174,30 @@ class Calibration:
     def draws(self, count: int, seed: int = 0) -> dict[str, NDArray]:
         """A stratified sample of the posterior: parameter -> values, shape (count,)."""
         return pick_draws(self.posterior, count, seed)
+
+
+def pick_draws(posterior: "Dataset", count: int, seed: int) -> dict[str, NDArray[np.float64]]:
+    """A stratified sample of a posterior.
+
+    The draws are ordered by the first parameter and cut into `count` equal strata, with one
+    draw at random from each: as unbiased as `count` independent draws, with less variance.
+
+    Args:
+        posterior: Variables of shape (chain, draw).
+        count: How many draws, at most as many as there are.
+        seed: Decides which.
+
+    Returns:
+        Parameter -> values, shape (count,).
+
+    Raises:
+        ValueError: More draws were asked for than there are.
+    """
+    flat = {str(name): values.to_numpy().ravel() for name, values in posterior.items()}
+    first = next(iter(flat.values()))
+    if not 1 <= count <= first.size:
+        raise ValueError(f"draws must be from 1 to {first.size}, got {count}")
+    rng = generator(seed, Phase.POSTERIOR_DRAWS)
+    strata = np.array_split(np.argsort(first, kind="stable"), count)
+    chosen = np.array([rng.choice(stratum) for stratum in strata])
+    return {name: values[chosen] for name, values in flat.items()}

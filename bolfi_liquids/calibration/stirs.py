@@ -1,15 +1,16 @@
-"""StirSimulator recordings as experiments that the engine can criticise."""
+"""Stirred recordings as experiments that the engine can criticise."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import Argument, InputError
+from ..inputs.fields import PLANE_NAMES
 from ..inputs.recording import Recording
-from ..inputs.strokes import resting
+from ..inputs.strokes import resting, speed, strokes
 from ..simulators import StirSimulator
-from .stir_windows import windows
 
 if TYPE_CHECKING:
     from ..inference.criticism import (
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
         Extension,
         Noise,
         UsualResidual,
+        Window,
     )
 
 REST_TREND_DEGREE = 2
@@ -32,6 +34,9 @@ oil the simulator errs by 0.25 deg; on paths that differ by 2 mm these errors di
 
 RATE_TOLERANCE = 0.02
 """Relative difference up to which two frame rates are the same."""
+
+SPEED_BINS = 3
+"""Stretches of like speed that a stir is cut into, beside its strokes."""
 
 
 def camera_noise(recordings: Sequence[Recording]) -> "AutoregressiveNoise":
@@ -93,6 +98,46 @@ def stir_experiment(
     return Experiment(
         stirring.simulate, stirring.observed, noise, stirring.identity, label, windows(stirring)
     )
+
+
+def windows(stirring: StirSimulator) -> tuple["Window", ...]:
+    """Strokes in each plane, then speeds in both, over the joined samples."""
+    from ..inference.criticism import Window
+
+    def whole(member: int, samples: NDArray[np.bool_], planes: tuple[int, ...]) -> NDArray:
+        there = np.zeros((*stirring.member.shape, len(PLANE_NAMES)), bool)
+        rows = np.flatnonzero(stirring.member == member)[samples]
+        there[rows[:, None], list(planes)] = True
+        return there
+
+    found = []
+    for member, recording in enumerate(stirring.recordings):
+        for stroke in strokes(recording):
+            time = recording.time[stroke.samples]
+            label = {
+                "recording": recording.path.name,
+                "stroke": stroke.number,
+                "start_s": float(time[0]),
+                "stop_s": float(time[-1]),
+            }
+            for plane, name in enumerate(PLANE_NAMES):
+                samples = whole(member, stroke.samples, (plane,))
+                found.append(Window({"channel": name, **label}, samples))
+        for text, samples in _speeds(recording):
+            label = {"recording": recording.path.name, "speed": text}
+            found.append(Window(label, whole(member, samples, (0, 1))))
+    return tuple(found)
+
+
+def _speeds(recording: Recording) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+    """Stretches of like speed after the first rest."""
+    fast, rest = speed(recording), resting(recording)
+    edges = np.linspace(0.0, fast.max(), SPEED_BINS + 1)
+    bins = np.clip(np.digitize(fast, edges) - 1, 0, SPEED_BINS - 1)
+    for k in range(SPEED_BINS):
+        samples = (bins == k) & ~rest
+        if samples.any():
+            yield f"{100 * edges[k]:.0f} to {100 * edges[k + 1]:.0f} cm/s", samples
 
 
 def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Extension"]:

@@ -4,17 +4,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import computed_field
 
+from ..errors import InputError
 from ..inputs.frame import named_faults
 from ..models import stirring_error
 from ..run.summary import Number, Section
 from ..simulators import StirSimulator
 from ..wording import with_unit
-from .check import PosteriorCheck
+from .engine_fit import PosteriorCheck
 from .model_error import ModelError
 from .noise import irreducible_rms, rms
 
@@ -35,6 +37,9 @@ water the simulator errs by five times the noise, and no misfit below 0.58 degre
 MIN_NOISE_DEG = 0.1
 """Noise [deg] below which no camera measures: simulated recordings without noise count as if they
 had as much, or an unfinished search would pass for a wrong sign."""
+
+HOW_TO_POUR = "correct it and calibrate again, or choose a pour nevertheless: --force (force=True)"
+"""What to do about a bad fit."""
 
 TURNING_EFFECT = "camera_rotation"
 """Effect that accounts for a turned frame, once a criticism has accepted it."""
@@ -250,6 +255,31 @@ class CalibrationSummary(Section):
         mixed = self.rhat_max <= RHAT_MAX and self.ess_min >= ESS_MIN  # neither holds for NaN
         good = mixed and self.divergent_share <= DIVERGENT_SHARE_MAX
         return SamplerStatus.CONVERGED if good else SamplerStatus.NOT_CONVERGED
+
+
+def bad_fit(summary: CalibrationSummary) -> str | None:
+    """What is likely wrong with a fit; None where it is as close as can be asked for.
+
+    Args:
+        summary: Of the calibration that counts, with what a criticism accepted.
+    """
+    if summary.fit_status is FitStatus.ACCEPTABLE:
+        return None
+    if summary.frame_faults:
+        return f"{'; '.join(summary.frame_faults)}. Do not rely on the posterior."
+    return (
+        f"The fit is bad: {summary.fit_rms_deg:.2f}° RMS, of which the simulator's own error is "
+        f"about {summary.simulator_error_deg:.2f}°; the rest is {summary.fit_to_noise:.1f} times "
+        f"the noise of {summary.noise_deg:.2f}°. A sign, the direction of the axes, the clock, a "
+        "size or a density is likely wrong, too little was simulated, or the simulator lacks an "
+        "effect. Do not rely on the posterior."
+    )
+
+
+def refuse_bad_fit(summary: CalibrationSummary, run: Path) -> None:
+    """Raise `InputError` where the fit of a run is too bad to go on with."""
+    if (found := bad_fit(summary)) is not None:
+        raise InputError(found.rstrip("."), where=str(run), fix=HOW_TO_POUR)
 
 
 def unexplained(misfit: float, error: float) -> float:

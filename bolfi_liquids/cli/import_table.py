@@ -30,11 +30,12 @@ def import_table(
     First write a template; change it to say what stands where in your table; then import.
     """
     from ..files import existing_file
+    from ..inputs.bundled import write_template
     from ..inputs.table_import import import_table as run_import
-    from ..inputs.table_import import outline, write_template
+    from ..inputs.table_import import outline
 
     if template is not None:
-        written = write_template(template)
+        written = write_template("columns.toml", template)
         then = command("import", "TABLE", "--columns", written)
         typer.echo(f"{written}: change it, then: {then}")
         return

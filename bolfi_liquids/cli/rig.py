@@ -56,10 +56,10 @@ def template(
     out: Annotated[Path, typer.Argument(metavar="FILE", help="To be written.")] = Path("rig.toml"),
 ) -> None:
     """Write the bundled rig.toml, to make it your own."""
-    from ..inputs.rigs import write_template
+    from ..inputs.bundled import write_template
 
     then = command("rig", "check", "--rig", out)
-    typer.echo(f"{write_template(out)}: change it, then: {then}")
+    typer.echo(f"{write_template('rig.toml', out)}: change it, then: {then}")
 
 
 @app.command(

@@ -7,14 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..calibration.baseline import Clean, clean_residuals, usual_elsewhere, usual_for
+from ..calibration.model_error import Clean, clean_residuals, usual_for
 from ..calibration.result import Calibration
 from ..calibration.stirs import camera_noise, effects_of, held_out_noise, stir_experiment
 from ..errors import Argument, InputError
-from ..inputs.frame import frame_warnings
+from ..inputs.frame import recording_warnings
 from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import Pours, PourTable
-from ..inputs.recording import Recording, recording_warnings
+from ..inputs.recording import Recording
 from ..inputs.settings import CriticismSettings
 from ..progress import phases
 from ..run.compute import open_compute
@@ -95,7 +95,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     with Run.entered(calibration) as run:
         base = Calibration.of(run)
         inputs = open_inputs(base, settings, given)
-        for notice in [*recording_warnings(inputs.compared), *frame_warnings(inputs.compared)]:
+        for notice in recording_warnings(inputs.compared):
             logger.warning(notice)
         for name in inputs.left_out:
             logger.warning("baseline %s: is criticised or held out, so it is not counted", name)
@@ -158,7 +158,9 @@ def _stirs(
         extensions,
         earlier=_learned_from(calibration),
         held_out=[_kept_back(one, stirring, clean, viscosity) for one in inputs.held_out],
-        proposals=stir_proposals(stirring, cameras, usual_elsewhere(stirring, clean, viscosity)),
+        proposals=stir_proposals(
+            stirring, cameras, usual_for(stirring, clean, viscosity, elsewhere=True)
+        ),
         accept=_among(settings.accept, extensions),
         plan=settings.stir_plan,
         **how,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .. import inference
-    from ..calibration.baseline import Clean
+    from ..calibration.model_error import Clean
     from ..calibration.result import Calibration
     from .inputs import Inputs
 

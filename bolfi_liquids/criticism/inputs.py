@@ -7,7 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..calibration.baseline import check_baseline, check_rig
+from ..calibration.model_error import check_baseline, check_rig
 from ..calibration.result import Calibration
 from ..calibration.stirs import names_of_effects
 from ..errors import Argument, InputError

@@ -1,8 +1,10 @@
-"""Recordings and pours of reference solvers that come with the package."""
+"""Recordings, pours and templates that come with the package."""
 
 from importlib.resources import as_file, files
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..files import new_file, unused_path, write_text
 from .open import open_recording
 from .recording import Recording
 
@@ -11,6 +13,7 @@ if TYPE_CHECKING:
 
 RECORDED_LIQUIDS = ("water", "oil", "glycerin", "gel")
 POURED_LIQUIDS = ("water", "glycerin")
+TEMPLATES = {"columns.toml": "bolfi_liquids.data", "rig.toml": "bolfi_liquids.hardware.data"}
 
 
 def bundled_recording(liquid: str) -> Recording:
@@ -25,3 +28,13 @@ def bundled_pours(liquid: str) -> "PourTable":
 
     with as_file(files("bolfi_liquids.data") / "pours.csv") as path:
         return open_pours(path, liquid)
+
+
+def write_template(name: str, path: str | Path) -> Path:
+    """Write one of `TEMPLATES`, to be changed into one's own.
+
+    Raises:
+        InputError: There is a file already, or none can be made there.
+    """
+    target = new_file(unused_path(path, "FILE"))
+    return write_text(target, (files(TEMPLATES[name]) / name).read_text(encoding="utf-8"))

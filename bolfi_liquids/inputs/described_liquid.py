@@ -95,53 +95,47 @@ def read_effects(given: Iterable[str], scene: str) -> dict[str, float]:
         scene: "stir" or "pour".
 
     Raises:
-        InputError: One is of another form or given twice, or see `check_effects`.
+        InputError: One is given twice, or see `check_effects`.
     """
-    read: dict[str, float] = {}
+    read: dict[str, float | str] = {}
     for text in given:
         name, _, value = (part.strip() for part in text.partition("="))
         if name in read:
             raise InputError("given twice", where=f"--effect {text}", fix="give it once")
         try:
-            number = parse_number(value)
+            read[name] = parse_number(value)
         except ValueError:
-            number = math.nan
-        read[name] = _coefficient(name, number, value, scene)
-    return read
+            read[name] = value  # refused as a coefficient
+    return check_effects(read, scene)
 
 
-def check_effects(effects: Mapping[str, float] | None, scene: str) -> dict[str, float]:
+def check_effects(effects: Mapping[str, Any] | None, scene: str) -> dict[str, float]:
     """Coefficients that can act in a scene, "stir" or "pour".
 
     Raises:
         InputError: They are no numbers by name, or one is unknown, out of its range, or acts in
             the other scene only.
     """
-    if effects is None:
-        return {}
+    from ..models import EFFECTS
+
+    effects = {} if effects is None else effects
     if not isinstance(effects, Mapping):
         raise InputError(
             f"{effects!r:.80}", where=Argument("effects"), fix="give coefficients by name"
         )
-    numbers = {name: number_of(value, f"--effect {name}") for name, value in effects.items()}
-    return {name: _coefficient(name, one, f"{one:g}", scene) for name, one in numbers.items()}
-
-
-def _coefficient(name: str, value: float, given: str, scene: str) -> float:
-    """`value`, if an effect takes it as its coefficient; NaN where `given` is no number."""
-    from ..models import EFFECTS
-
-    where = f"--effect {name}={given}"
-    if name not in EFFECTS:
-        raise InputError("unknown", where=where, fix=f"there are {', '.join(sorted(EFFECTS))}")
-    effect = EFFECTS[name]
-    if not effect.lowest <= value <= effect.highest:
-        raise InputError(
-            f"{given!r:.80} is no coefficient of it",
-            where=where,
-            fix=f"give {name}=NUMBER, from {effect.lowest:g} to {effect.highest:g} in the unit "
-            f"{effect.unit}",
-        )
-    if scene not in effect.scenes:
-        raise InputError(f"does not act in a {scene}", where=where, fix="leave it out")
-    return value
+    for name, value in effects.items():
+        is_real = isinstance(value, Real) and not isinstance(value, bool)
+        where = f"--effect {name}={f'{value:g}' if is_real else value}"
+        if name not in EFFECTS:
+            raise InputError("unknown", where=where, fix=f"there are {', '.join(sorted(EFFECTS))}")
+        effect = EFFECTS[name]
+        if not is_real or not effect.lowest <= value <= effect.highest:
+            raise InputError(
+                f"{value!r:.80} is no coefficient of it",
+                where=where,
+                fix=f"give {name}=NUMBER, from {effect.lowest:g} to {effect.highest:g} in the unit "
+                f"{effect.unit}",
+            )
+        if scene not in effect.scenes:
+            raise InputError(f"does not act in a {scene}", where=where, fix="leave it out")
+    return {name: float(value) for name, value in effects.items()}

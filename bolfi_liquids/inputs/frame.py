@@ -87,13 +87,21 @@ def found_turn(recording: Recording) -> FrameRotation | None:
     )
 
 
-def frame_warnings(recordings: Iterable[Recording]) -> list[str]:
-    """What is wrong with the frames of recordings, and how it is mended."""
-    return [f"{one.path}: {text}" for one in recordings for text in frame_faults(one)]
+def recording_warnings(recordings: Iterable[Recording]) -> list[str]:
+    """A warning for each recording that something stopped, for each torn value and wrong frame."""
+    warnings = []
+    for one in recordings:
+        if one.attrs.get("status") == "aborted":
+            warnings.append(
+                f"{one.path}: aborted after {one.time[-1] - one.time[0]:.1f} s of stirring "
+                f"({one.attrs.get('reason') or 'no reason given'}); a short stir says little"
+            )
+        warnings += [f"{one.path}: {text}" for text in (*one.torn, *frame_faults(one))]
+    return warnings
 
 
 def named_faults(recordings: Iterable[Recording]) -> tuple[str, ...]:
-    """The same with the names of the files alone, as a run keeps it."""
+    """Faults of frames with the names of the files, as a run keeps them."""
     return tuple(f"{one.path.name}: {text}" for one in recordings for text in frame_faults(one))
 
 

@@ -16,18 +16,6 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 HDF5, CLASSIC_NETCDF = b"\x89HDF\r\n\x1a\n", b"CDF"  # how such files begin
-DAMAGE = (
-    OSError,
-    ValueError,
-    RuntimeError,
-    LookupError,
-    AttributeError,
-    TypeError,
-    ArithmeticError,
-    MemoryError,
-)
-"""What the libraries that read NetCDF raise where bytes of a file are wrong."""
-
 Source = Recording | str | Path
 
 
@@ -75,21 +63,19 @@ def open_recordings(
     Raises:
         InputError: One of them cannot be used.
     """
-    if isinstance(sources, Source) or not isinstance(sources, Iterable):
-        return [_opened(sources, option)]
-    return [_opened(one, option) for one in sources]
-
-
-def _opened(source: object, option: str) -> Recording:
-    if isinstance(source, Recording):
-        return source
-    if isinstance(source, str | Path):
-        return open_recording(source)
-    raise InputError(
-        f"{source!r:.80} is no recording",
-        where=option,
-        fix="give paths of NetCDF files, or what open_recording returns",
-    )
+    one_alone = isinstance(sources, Source) or not isinstance(sources, Iterable)
+    opened = []
+    for one in [sources] if one_alone else sources:
+        if isinstance(one, str | Path):
+            one = open_recording(one)
+        elif not isinstance(one, Recording):
+            raise InputError(
+                f"{one!r:.80} is no recording",
+                where=option,
+                fix="give paths of NetCDF files, or what open_recording returns",
+            )
+        opened.append(one)
+    return opened
 
 
 def read_fields(content: bytes, path: Path) -> "Dataset":
@@ -98,6 +84,9 @@ def read_fields(content: bytes, path: Path) -> "Dataset":
     Raises:
         InputError: The file is damaged, or lacks a field.
     """
+    import h5py
+    import xarray
+
     if not content.startswith((HDF5, CLASSIC_NETCDF)):
         raise InputError(
             "not a NetCDF file that can be read",
@@ -105,24 +94,12 @@ def read_fields(content: bytes, path: Path) -> "Dataset":
             fix="if it is a table, bolfi-liquids import makes a recording of it",
         )
     try:
-        if content.startswith(HDF5):
-            _check_root(content)
-        import xarray
-
+        if content.startswith(HDF5):  # where its root is damaged, h5netcdf complains twice
+            with h5py.File(io.BytesIO(content), "r") as file:
+                list(file.attrs.items())
         # times stay numbers: a unit such as "ms" is then seen, not silently converted
         dataset = xarray.load_dataset(io.BytesIO(content), decode_times=False)
-    except DAMAGE as err:
+    except Exception as err:  # the libraries raise whatever wrong bytes lead to
         raise InputError("damaged, cannot be read", where=str(path), fix="copy it again") from err
     check_fields(dataset, path)
     return dataset
-
-
-def _check_root(content: bytes) -> None:
-    """Raise what `DAMAGE` lists where the root of an HDF5 file is damaged.
-
-    h5netcdf leaves a half-made file behind there, which complains once more when it is collected.
-    """
-    import h5py
-
-    with h5py.File(io.BytesIO(content), "r") as file:
-        list(file.attrs.items())

@@ -1,10 +1,9 @@
 """A recording of a stir, and the variables of its file."""
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -107,10 +106,6 @@ class Recording:
             inclination=self.inclination[:count],
         )
 
-    def __reduce__(self):
-        """Processes that simulate need it, and a mapping proxy cannot be pickled."""
-        return _unpickled, ({**vars(self), "attrs": dict(self.attrs)},)
-
 
 def _told(name: str, value: float | str) -> str:
     """An attribute as a person reads it."""
@@ -119,23 +114,6 @@ def _told(name: str, value: float | str) -> str:
     if name in LENGTHS:
         return f"{name.partition('_')[2] or name} {100.0 * value:.3g} cm"
     return f"{value:.4g} {ATTRIBUTE_UNITS.get(name, '')}".strip()
-
-
-def _unpickled(values: dict[str, Any]) -> Recording:
-    return Recording(**{**values, "attrs": MappingProxyType(values["attrs"])})
-
-
-def recording_warnings(recordings: Iterable[Recording]) -> list[str]:
-    """A warning for each recording that something stopped, and for each torn value."""
-    warnings = []
-    for one in recordings:
-        if one.attrs.get("status") == "aborted":
-            warnings.append(
-                f"{one.path}: aborted after {one.time[-1] - one.time[0]:.1f} s of stirring "
-                f"({one.attrs.get('reason') or 'no reason given'}); a short stir says little"
-            )
-        warnings += [f"{one.path}: {text}" for text in one.torn]
-    return warnings
 
 
 def recording_dataset(values: Mapping[str, NDArray], attrs: Mapping[str, float | str]) -> "Dataset":
@@ -178,7 +156,7 @@ def planned_recording(
             raise InputError("missing", where=f"plan: attribute {name}", fix="weigh the liquid")
     unseen = np.full((len(time), 2), np.nan)
     path = Trajectory(time, position)
-    return Recording(time, path, unseen, MappingProxyType(dict(attrs)), Path("plan"), "")
+    return Recording(time, path, unseen, dict(attrs), Path("plan"), "")
 
 
 def along_path(recording: Recording, inclination: NDArray) -> dict[str, NDArray]:
@@ -205,7 +183,7 @@ def as_recording(dataset: "Dataset", path: Path, content: bytes) -> Recording:
         time=time,
         gripper=Trajectory(time, _frozen(np.stack([values[name] for name in AXES], axis=-1))),
         inclination=_frozen(np.stack([values[name] for name in PLANES], axis=-1)),
-        attrs=MappingProxyType({str(k): _plain(v) for k, v in dataset.attrs.items()}),
+        attrs={str(k): _plain(v) for k, v in dataset.attrs.items()},
         path=path,
         hash=hashlib.sha256(content).hexdigest(),
         torn=torn,

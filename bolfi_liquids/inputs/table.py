@@ -45,7 +45,7 @@ class Table:
         delimiter: Between two cells.
         decimal: In a number.
         lines: Line of the file that each row stands in, counted from 1, shape (rows,).
-        cells: Texts without blanks around them, shape (rows, columns); None beyond a line's end.
+        cells: Texts without blanks around them, shape (rows, columns).
     """
 
     path: Path
@@ -57,7 +57,7 @@ class Table:
 
     def has(self, name: str) -> bool:
         """Whether a column has this name, upper case and blanks aside."""
-        return any(_plain(one) == _plain(name) for one in self.header)
+        return _plain(name) in map(_plain, self.header)
 
     def others(self, names: Iterable[str]) -> tuple[str, ...]:
         """Columns of other names than these."""
@@ -68,13 +68,25 @@ class Table:
         """Texts of a column, shape (rows,); upper case and blanks of its name do not matter.
 
         Raises:
-            InputError: No column, or more than one, has this name, or a line ends before it.
+            InputError: No column, or more than one, has this name; `fix` is what to do then.
         """
-        at = self._position(name, fix)
-        for line, row in zip(self.lines, self.cells, strict=True):
-            if row[at] is None:
-                raise _misfit(self.path, line, np.sum(row != None), len(self.header))  # noqa: E711
-        return self.cells[:, at]
+        exact = [at for at, one in enumerate(self.header) if one == name]
+        found = exact or [at for at, one in enumerate(self.header) if _plain(one) == _plain(name)]
+        if len(found) == 1:
+            return self.cells[:, found[0]]
+        where = f"{self.path}: header"
+        if found:
+            raise InputError(
+                f"{len(found)} columns are named {name!r}", where=where, fix="give each its own"
+            )
+        close = get_close_matches(name, self.header, n=1, cutoff=0.6)
+        likely = f"; did you mean {close[0]!r}?" if close else ""
+        raise InputError(
+            f"no column {name!r} among {', '.join(map(repr, self.header)) or 'none'} "
+            f"(delimiter {self.delimiter!r}){likely}",
+            where=where,
+            fix=fix,
+        )
 
     def numbers(
         self, name: str, fix: str = "correct the header", remark: str = ""
@@ -109,26 +121,6 @@ class Table:
         """Place of a cell, for a refusal."""
         return f"{self.path}: line {line}, column {name}"
 
-    def _position(self, name: str, fix: str) -> int:
-        exact = [at for at, one in enumerate(self.header) if one == name]
-        near = [at for at, one in enumerate(self.header) if _plain(one) == _plain(name)]
-        found = exact or near
-        if len(found) == 1:
-            return found[0]
-        where = f"{self.path}: header"
-        if found:
-            raise InputError(
-                f"{len(found)} columns are named {name!r}", where=where, fix="give each its own"
-            )
-        close = get_close_matches(name, self.header, n=1, cutoff=0.6)
-        likely = f"; did you mean {close[0]!r}?" if close else ""
-        raise InputError(
-            f"no column {name!r} among {', '.join(map(repr, self.header)) or 'none'} "
-            f"(delimiter {self.delimiter!r}){likely}",
-            where=where,
-            fix=fix,
-        )
-
 
 def read_table(
     path: str | Path, *, delimiter: str | None = None, decimal: str | None = None, skip: int = 0
@@ -146,29 +138,29 @@ def read_table(
     """
     path = existing_file(path)
     if path.suffix.lower() == ".xlsx":
-        rows, delimiter, decimal = _sheet(path), ",", "."
-        rows = [row for row in rows if row[0] > skip]
+        rows, delimiter, decimal = _sheet(path)[skip:], ",", "."
     else:
-        lines = _lines(path)
-        delimiter = delimiter or _delimiter(lines, skip)
+        lines = _lines(path)[skip:]
+        # by the header alone: below it a decimal comma looks like a delimiter
+        signs = (sign for sign in (";", "\t") if sign in "".join(lines[:1]))
+        delimiter = delimiter or next(signs, ",")
         rows = _rows(path, lines, delimiter, skip)
     first, header = rows[0] if rows else (1, [])
     while header and not header[-1]:
         header = header[:-1]
     _check_header(path, header, first)
     kept = [(line, row) for line, row in rows[1:] if any(row)]
-    cells = np.full((len(kept), len(header)), None, object)
-    for at, (line, row) in enumerate(kept):
-        if any(row[len(header) :]):
-            raise _misfit(path, line, len(row), len(header))
-        cells[at, : len(row)] = row[: len(header)]
+    for line, row in kept:
+        _check_row(path, line, row, len(header))
+    cells = np.array([row[: len(header)] for _, row in kept], object)
+    comma = delimiter == ";" and any("," in cell and is_number(cell) for cell in cells.ravel())
     return Table(
         path=path,
         header=tuple(header),
         delimiter=delimiter,
-        decimal=decimal or _decimal(delimiter, cells.ravel().tolist()),
+        decimal=decimal or ("," if comma else "."),
         lines=np.array([line for line, _ in kept], np.int64),
-        cells=cells,
+        cells=cells.reshape(len(kept), len(header)),
     )
 
 
@@ -221,21 +213,15 @@ def _lines(path: Path) -> list[str]:
     return text.splitlines(keepends=True)
 
 
-def _delimiter(lines: list[str], skip: int) -> str:
-    """By the header alone: below it a decimal comma looks like a delimiter."""
-    header = lines[skip] if skip < len(lines) else ""
-    return next((sign for sign in (";", "\t") if sign in header), ",")
-
-
-def _rows(path: Path, lines: list[str], delimiter: str, skip: int) -> list[Row]:
-    """All lines after the first `skip`, blank ones among them, but for Excel's `sep=;`."""
-    reader = csv.reader(lines[skip:], delimiter=delimiter, skipinitialspace=True, strict=True)
+def _rows(path: Path, lines: list[str], delimiter: str, skipped: int) -> list[Row]:
+    """All lines, blank ones among them, but for Excel's `sep=;`."""
+    reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True, strict=True)
     try:
-        rows = [(reader.line_num + skip, [cell.strip() for cell in row]) for row in reader]
+        rows = [(reader.line_num + skipped, [cell.strip() for cell in row]) for row in reader]
     except csv.Error as err:
         raise InputError(
             str(err),
-            where=f"{path}: line {reader.line_num + skip}",
+            where=f"{path}: line {reader.line_num + skipped}",
             fix="look for a quotation mark that is not closed",
         ) from err
     return rows[1:] if rows and rows[0][1][:1] == ["sep="] else rows
@@ -256,11 +242,6 @@ def _sheet(path: Path) -> list[Row]:
     return [(line, [cell.strip() for cell in row]) for line, row in enumerate(rows, start=1)]
 
 
-def _decimal(delimiter: str, cells: list[str | None]) -> str:
-    numbers = [cell for cell in cells if cell and is_number(cell)]
-    return "," if delimiter == ";" and any("," in cell for cell in numbers) else "."
-
-
 def _check_header(path: Path, header: list[str], line: int) -> None:
     """Refuse a table that begins with its numbers."""
     if header and all(map(is_number, header)):
@@ -272,12 +253,14 @@ def _check_header(path: Path, header: list[str], line: int) -> None:
         )
 
 
-def _misfit(path: Path, line: int, count: int, columns: int) -> InputError:
-    """A line of fewer or more cells than its header."""
+def _check_row(path: Path, line: int, row: list[str], columns: int) -> None:
+    """Refuse a line of fewer or more cells than its header; empty ones may follow the last."""
+    if len(row) >= columns and not any(row[columns:]):
+        return
     extra = "put quotation marks around a cell that holds the delimiter, or remove what is extra"
     short = "complete the line, with empty cells for what is missing"
-    return InputError(
-        f"{count} cells, where the header has {columns}",
+    raise InputError(
+        f"{len(row)} cells, where the header has {columns}",
         where=f"{path}: line {line}",
-        fix=extra if count > columns else short,
+        fix=extra if len(row) > columns else short,
     )

@@ -5,7 +5,6 @@ import logging
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from importlib.metadata import version
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from ..errors import Argument, InputError
-from ..files import given_path, new_netcdf, write_netcdf, write_text
+from ..files import given_path, new_netcdf, write_netcdf
 from .checks import MAX_GRIPPER_GAP, MIN_SEEN, check_values, clock_difference
 from .fields import AXES, PLANES, STICK_WEIGHT
 from .frame import frame_faults
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-TEMPLATE = "columns.toml"
 OTHER_NAME = "choose another name"
 SLOWER = 1.5  # times a step of a log: a longer one is another's, or leaves a row out
 HEADER_FIX = "correct the map: `column`, `skip` or `delimiter`"
@@ -205,18 +203,6 @@ def open_table_map(path: str | Path) -> TableMap:
     return read_toml(path, TableMap, fix=MAP_FIX)
 
 
-def write_template(path: str | Path) -> Path:
-    """Write a map to be changed into one's own.
-
-    Raises:
-        InputError: There is a file of that name.
-    """
-    path = given_path(path, Argument("path"))
-    if path.exists():
-        raise InputError("exists already", where=str(path), fix=OTHER_NAME)
-    return write_text(path, (files("bolfi_liquids.data") / TEMPLATE).read_text(encoding="utf-8"))
-
-
 def import_table(table: str | Path, columns: str | Path | TableMap, out: str | Path) -> Recording:
     """Write a recording from a table, once it is sure that it can be simulated.
 
@@ -306,18 +292,13 @@ def one_row_per_stamp(values: dict[str, NDArray]) -> dict[str, NDArray]:
     Returns:
         Likewise; the same values where stamps differ, or where two rows contradict each other.
     """
-    time = values["time"]
-    if not (np.diff(time) >= 0.0).all():
+    from pandas import DataFrame
+
+    rows = DataFrame(values).groupby("time")
+    if not (np.diff(values["time"]) >= 0.0).all() or (rows.count() > 1).any(axis=None):
         return values
-    stamps, row = np.unique(time, return_inverse=True)
-    merged = {"time": stamps}
-    for name in (*AXES, *PLANES):
-        known = np.isfinite(values[name])
-        if np.bincount(row[known]).max(initial=0) > 1:
-            return values
-        merged[name] = np.full(len(stamps), np.nan)
-        merged[name][row[known]] = values[name][known]
-    return merged
+    merged = rows.first().reset_index()  # of each variable what is not missing
+    return {name: merged[name].to_numpy() for name in values}
 
 
 def at_camera_times(values: dict[str, NDArray]) -> tuple[dict[str, NDArray], str]:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.bad_fit import refuse_bad_fit
 from ..calibration.result import Calibration
+from ..calibration.summary import refuse_bad_fit
 from ..criticism.result import Criticism, calibration_to_pour
 from ..errors import Argument, InputError
 from ..inputs.cups import cups_of
@@ -80,7 +80,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         draws: Posterior draws that each action is tried on; twice as many judge.
         risk: "mean", or "cvar": the mean over the worst tenth of the draws.
         seed: Seed of all random draws; the pours do not depend on it.
-        force: Whether to choose even though the fit is bad, see `calibration.bad_fit`.
+        force: Whether to choose even though the fit is bad, see `calibration.summary.bad_fit`.
         executor, timeout, progress: See `calibrate`.
 
     Raises:

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..calibration.bad_fit import bad_fit
 from ..calibration.result import Calibration
-from ..calibration.summary import CalibrationSummary, ParameterSummary, SamplerStatus
+from ..calibration.summary import CalibrationSummary, ParameterSummary, SamplerStatus, bad_fit
 from ..criticism.result import Criticism
 from ..criticism.source_summary import DifferingWindow, PourVerdict, SourceVerdict
 from ..criticism.summary import CriticismSummary

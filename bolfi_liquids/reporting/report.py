@@ -9,9 +9,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..calibration.fit_figures import draw_fit, draw_strokes
-from ..calibration.posterior_figure import draw_posterior
-from ..calibration.search_figure import draw_search
+from ..calibration.figures import draw_fit, draw_posterior, draw_search, draw_strokes
 from ..criticism.effect_figures import coefficient_plot, confusion_plot, score_plot
 from ..criticism.figures import held_out_plot, pour_residual_plot, residual_plot, stroke_plot
 from ..criticism.result import Criticism

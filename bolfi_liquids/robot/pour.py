@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..calibration.bad_fit import bad_fit
-from ..calibration.summary import FitStatus
+from ..calibration.summary import FitStatus, bad_fit
 from ..errors import InputError
 from ..inputs.cups import kept_cups
 from ..inputs.rigs import rig_of

@@ -16,8 +16,6 @@ from ..inputs.pour_table import PourTable
 from .result_file import read_result, write_result
 
 if TYPE_CHECKING:
-    from xarray import Dataset
-
     from ..models import Cups
 
 GIVEN_POURS = "given_pours.nc"
@@ -50,8 +48,15 @@ def kept_pours(run: Path, cups: "Cups") -> PourTable | None:
     Raises:
         InputError: The file is damaged.
     """
-    held = _held(run)
-    if held is None or json.loads(held.attrs["cups"]) != _scene(cups):
+    path = run / GIVEN_POURS
+    if not path.is_file():
+        return None
+    try:
+        held = read_result(path).to_dataset()
+    except (OSError, ValueError) as err:
+        fix = "delete it, and give the table of pours again"
+        raise InputError("is damaged", where=str(path), fix=fix) from err
+    if json.loads(held.attrs["cups"]) != _scene(cups):
         return None
     return PourTable(
         path=Path(held.attrs["file"]),
@@ -65,27 +70,9 @@ def kept_pours(run: Path, cups: "Cups") -> PourTable | None:
 
 
 def digest_of_pours(run: Path) -> str:
-    """Digest of the table that the run was given, of its liquid's name and cups; "" without one.
-
-    Raises:
-        InputError: The file is damaged.
-    """
-    held = _held(run)
-    if held is None:
-        return ""
-    told = [held.attrs[name] for name in ("sha256", "liquid", "cups")]
-    return hashlib.sha256(json.dumps(told).encode()).hexdigest()
-
-
-def _held(run: Path) -> "Dataset | None":
+    """Digest of the table that the run was given, with its cups; "" without one."""
     path = run / GIVEN_POURS
-    if not path.is_file():
-        return None
-    try:
-        return read_result(path).to_dataset()
-    except (OSError, ValueError) as err:
-        fix = "delete it, and give the table of pours again"
-        raise InputError("is damaged", where=str(path), fix=fix) from err
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
 
 
 def _scene(cups: "Cups") -> dict[str, Any]:

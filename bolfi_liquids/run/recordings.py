@@ -1,7 +1,6 @@
 """A run's own copies of its recordings, so that it can be criticised wherever it was moved."""
 
 import hashlib
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,24 +11,6 @@ from ..inputs.open import read_fields
 from ..inputs.recording import Recording, as_recording
 
 RECORDINGS_FOLDER = "recordings"
-
-
-MAX_NAME_BYTES = 240  # of a recording: its number, and a few letters while it is copied, come to it
-
-
-def check_names(recordings: tuple[Recording, ...]) -> None:
-    """Refuse file names that are too long to copy.
-
-    Raises:
-        InputError: A name is too long.
-    """
-    for recording in recordings:
-        if (size := len(os.fsencode(recording.path.name))) > MAX_NAME_BYTES:
-            raise InputError(
-                f"its name has {size} bytes",
-                where=str(recording.path),
-                fix=f"rename it, to {MAX_NAME_BYTES} bytes at the most",
-            )
 
 
 def keep_recordings(run: Path, recordings: tuple[Recording, ...]) -> None:

@@ -6,6 +6,7 @@ while the run holds the same, and None otherwise.
 """
 
 import json
+import logging
 import sqlite3
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 
     from ..inference import Prior, SimulationBank
 
+logger = logging.getLogger(__name__)
+
 RUN_TOML = "run.toml"
 SIMULATIONS = "simulations.sqlite"
 MOVING = "moving"
@@ -53,6 +56,9 @@ OWN_FILES = (SIMULATIONS, *RESULTS.values(), GIVEN_POURS, RECORDINGS_FOLDER, MOV
 
 MUST_AGREE = ("settings", "inputs", "simulator", "engine")
 """Sections of run.toml that decide the results; dates, names and libraries may differ."""
+
+LAST_SECTION = "versions"
+"""Of run.toml: a file without it was cut off."""
 
 ABSENT = {
     "calibrate": "the calibration in it is not finished",
@@ -139,11 +145,44 @@ class Run:
             InputError: Another command works there; the directory holds a run and `resume` is
                 false; or the run was made with another setting, seed or input.
         """
+        record = tomllib.loads(tomli_w.dumps(record))  # as it will be read: TOML has no tuples
         with alone_in(path):
-            run = cls(path, _begin(path, record, resume=resume, growing=growing))
-            if resume:
+            if (path / RUN_TOML).exists():
+                if not resume:
+                    fix = "give `resume` to go on with it, or another `out`"
+                    raise InputError("holds a run already", where=str(path), fix=fix)
+                run = cls(path, cls.open(path)._continued(record, growing))
                 run.write_summary()  # a killed command may not have come to it
+            else:
+                _check_no_results(path)
+                _write(path, record)
+                run = cls(path, record)
             yield run
+
+    def _continued(self, wanted: Mapping[str, Any], growing: str) -> Mapping[str, Any]:
+        """The held record, or the wanted one with the held date where the run grows.
+
+        Raises:
+            InputError: They differ otherwise; the message names the first field.
+        """
+        differing = _differences(self.record, wanted)
+        held, asked = differing.get(growing, (None, None))
+        if grows := (asked or 0) > (held or 0):
+            del differing[growing]
+        for field, (held, asked) in differing.items():
+            if field.startswith("inputs."):
+                what = "is of other recordings"
+                fix = f"give those that {RUN_TOML} names under files, unchanged, or another `out`"
+                raise InputError(what, where=str(self.path), fix=fix)
+            own = f"resume with the run's own value of `{field.rpartition('.')[2]}`"
+            larger = " or a larger one" if field == growing else ""
+            raise InputError(
+                f"{field} is {held!r} in the run, but {asked!r} was asked",
+                where=str(self.path / RUN_TOML),
+                fix=f"{own}{larger}, or choose another `out`",
+            )
+        first = {"created": self.record["created"]} if "created" in self.record else {}
+        return {**wanted, **first} if grows else self.record
 
     @cached_property
     def recordings(self) -> list[Recording]:
@@ -170,6 +209,8 @@ class Run:
         from ..inference import SimulationBank
 
         path = self.path / SIMULATIONS
+        if not path.exists() and (self.path / RESULTS["calibrate"]).exists():
+            logger.warning("%s is missing: its simulations are made again", path)
         try:
             bank = SimulationBank(path)
         except (ValueError, sqlite3.Error) as err:
@@ -253,28 +294,25 @@ class Run:
     def again(self, step: str) -> str:
         """The command that makes a step's result, with the options of one that is readable."""
         if step == "calibrate":
-            clean = (
-                ["--baseline", "CLEAN..."] if "baseline" in self.record.get("inputs", {}) else []
-            )
-            recordings = kept_paths(self.path, self.record) or ["RECORDING..."]
-            words = ("calibrate", *recordings, *clean, "--out", self.path, "--resume")
-            return command(*words, *self._options())
-        return command(step, self.path, *self._options_of(step))
-
-    def _options_of(self, step: str) -> list[str]:
-        """Options with which a criticism or a pour was made, where they are not the default."""
+            clean = ["--baseline", "CLEAN..."] if "baseline" in self.record["inputs"] else []
+            return self._calibrate_again(*clean, "--out", self.path, "--resume")
         try:
             made = json.loads(read_result(self.path / RESULTS[step]).attrs["made_from"])
         except (OSError, ValueError):
-            return []
-        usual = asdict(CriticismSettings() if step == "criticise" else PourSettings())
-        changed = {k: v for k, v in made.get("settings", {}).items() if v != usual.get(k)}
+            return command(step, self.path)
+        usual = CriticismSettings() if step == "criticise" else PourSettings()
         files = {name: list(made.get(name, ())) for name in ("held_out", "baseline", "pours")}
-        options = []
-        for name, value in {**changed, **files}.items():
-            for one in value if isinstance(value, list) else [value]:
-                options += [f"--{name.replace('_', '-')}", str(one)]
-        return [*options, "--force"] if made.get("forced") else options
+        options = _options(
+            {**made.get("settings", {}), **files}, {**asdict(usual), **dict.fromkeys(files)}
+        )
+        forced = ["--force"] if made.get("forced") else []
+        return command(step, self.path, *options, *forced)
+
+    def _calibrate_again(self, *words: object) -> str:
+        """The command that calibrates on the kept recordings, with the settings of the run."""
+        recordings = kept_paths(self.path, self.record) or ("RECORDING...",)
+        options = _options(self.record["settings"], asdict(CalibrationSettings()))
+        return command("calibrate", *recordings, *words, *options)
 
     def _look(self, step: str) -> "tuple[DataTree | None, str]":
         """A step's current result, or why there is none."""
@@ -301,20 +339,9 @@ class Run:
         after = key_of(calibration) if step == "criticise" else self.posterior_key()
         if made_from["after"] != after:
             return "was made from another posterior"
-        if step == "pour":
-            try:
-                if made_from["given"] != digest_of_pours(self.path):
-                    return "was made with other given pours"
-            except InputError:
-                return "cannot be compared: the given pours are damaged"
+        if step == "pour" and made_from["given"] != digest_of_pours(self.path):
+            return "was made with other given pours"
         return ""
-
-    def _options(self) -> list[str]:
-        """Options with which the run was started, where they are not the default."""
-        settings, usual = self.record.get("settings", {}), asdict(CalibrationSettings())
-        given = {name: settings.get(name, default) for name, default in usual.items()}
-        changed = {name: value for name, value in given.items() if value != usual[name]}
-        return [word for name, value in changed.items() for word in (f"--{name}", str(value))]
 
     def _check_generation(self) -> None:
         """Refuse a run of another version of fluid or engine.
@@ -332,14 +359,23 @@ class Run:
                 if "files" not in self.record:  # of a check
                     what, fix = f"was made by another {part}", "choose another `out`"
                     raise InputError(what, where=str(self.path), fix=fix)
-                recordings = kept_paths(self.path, self.record) or ("RECORDING...",)
                 anew = self.path.with_name(f"{self.path.name}_{part}_{now[part]}")
-                words = ("calibrate", *recordings, "--out", anew, *self._options())
                 raise InputError(
                     f"was made by {part} {', '.join(sorted(versions))}, and this is {now[part]}",
                     where=str(self.path),
-                    fix=f"calibrate again: {command(*words)}",
+                    fix=f"calibrate again: {self._calibrate_again('--out', anew)}",
                 )
+
+
+def _options(settings: Mapping[str, Any], usual: Mapping[str, Any]) -> list[str]:
+    """Options of a command, where they are not the usual ones; a list repeats its option."""
+    return [
+        word
+        for name, value in settings.items()
+        if name in usual and value != usual[name]
+        for one in (value if isinstance(value, list) else [value])
+        for word in (f"--{name.replace('_', '-')}", str(one))
+    ]
 
 
 def as_json(made_from: Mapping[str, Any]) -> str:
@@ -383,7 +419,7 @@ def _read(path: Path) -> dict[str, Any]:
     """run.toml.
 
     Raises:
-        InputError: There is none, or it is not TOML.
+        InputError: There is none, it is not TOML, or its end is missing.
     """
     file = path / RUN_TOML
     if not file.is_file():
@@ -393,57 +429,36 @@ def _read(path: Path) -> dict[str, Any]:
             fix="give the directory of a run, as made by: bolfi-liquids calibrate ... --out RUN",
         )
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        record = tomllib.loads(file.read_text(encoding="utf-8"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as err:
         raise InputError(f"not TOML ({err})", where=str(file), fix="restore the file") from err
+    if "settings" in record and LAST_SECTION not in record:
+        what = f"is cut off: it ends before its section {LAST_SECTION}"
+        raise InputError(what, where=str(file), fix="restore the file")
+    return record
 
 
-def _begin(
-    path: Path, record: Mapping[str, Any], *, resume: bool, growing: str
-) -> Mapping[str, Any]:
-    """run.toml of a run that begins, or goes on; see `Run.begun`."""
-    if (path / RUN_TOML).exists():
-        if not resume:
-            fix = "give `resume` to go on with it, or another `out`"
-            raise InputError("holds a run already", where=str(path), fix=fix)
-        held = Run.open(path).record
-        differing = _differences(held, record)
-        if grows := growing in differing and _larger(*differing[growing]):
-            del differing[growing]
-        if differing:
-            raise _refused(differing, path, growing)
-        limits = dict.fromkeys([*held.get("timeouts", ()), *record.get("timeouts", ())])
-        listed = {"timeouts": list(limits)} if limits else {}
-        if listed and listed["timeouts"] != held.get("timeouts"):
-            _write(path, {**held, **listed})
-        first = {"created": held["created"]} if "created" in held else {}
-        return _as_read({**(record if grows else held), **first, **listed})
-    elif orphans := [name for name in OWN_FILES if (path / name).exists()]:
-        raise InputError(
-            f"holds {orphans[0]} without {RUN_TOML}",
-            where=str(path),
-            fix="choose another `out`; nothing was overwritten",
-        )
-    _write(path, record)
-    return _as_read(record)
+def _check_no_results(path: Path) -> None:
+    """Raise `InputError` where results lie without the settings that made them."""
+    for name in OWN_FILES:
+        if (path / name).exists():
+            raise InputError(
+                f"holds {name} without {RUN_TOML}",
+                where=str(path),
+                fix="choose another `out`; nothing was overwritten",
+            )
 
 
 def _write(path: Path, record: Mapping[str, Any]) -> None:
     write_text(path / RUN_TOML, tomli_w.dumps(record))
 
 
-def _as_read(record: Mapping[str, Any]) -> dict[str, Any]:
-    """The record as it will be read: TOML has no tuples."""
-    return tomllib.loads(tomli_w.dumps(record))
-
-
-def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+def _differences(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
     """Fields that decide the results -> their values in both records, where these differ."""
-    wanted, held = (
-        dict(_fields({name: one.get(name) for name in MUST_AGREE})) for one in (_as_read(new), old)
+    old, new = (
+        dict(_fields({k: one[k] for k in MUST_AGREE if k in one})) for one in (held, wanted)
     )
-    fields = [*wanted, *(held.keys() - wanted.keys())]
-    both = {field: (held.get(field), wanted.get(field)) for field in fields}
+    both = {field: (old.get(field), new.get(field)) for field in {**new, **old}}
     return {field: values for field, values in both.items() if values[0] != values[1]}
 
 
@@ -454,23 +469,6 @@ def _fields(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any
             yield from _fields(value, name)
         else:
             yield name, value
-
-
-def _larger(held: Any, wanted: Any) -> bool:
-    return isinstance(held, int) and isinstance(wanted, int) and wanted > held
-
-
-def _refused(differing: Mapping[str, tuple[Any, Any]], path: Path, growing: str) -> InputError:
-    """A refusal that names the first field that differs from the run's."""
-    field, (held, wanted) = next(iter(differing.items()))
-    if field.startswith("inputs."):
-        what = "is of other recordings"
-        fix = f"give those that {RUN_TOML} names under files, unchanged, or choose another `out`"
-        return InputError(what, where=str(path), fix=fix)
-    what = f"{field} is {held!r} in the run, but {wanted!r} was asked"
-    own = "the run's own value" + (" or a larger one" if field == growing else "")
-    fix = f"resume with {own}, or choose another `out`"
-    return InputError(what, where=f"{path / RUN_TOML}", fix=fix)
 
 
 def _unusable(path: Path, err: Exception) -> InputError:

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -113,7 +112,7 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     density = opened.number("liquid_density") if density is None else given
     liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": density}
     of_another = _with_rig(opened.attrs, rig) | {"liquid_density": density}
-    plan = _planned(replace(opened, attrs=MappingProxyType(of_another)), path)
+    plan = _planned(replace(opened, attrs=of_another), path)
     count = particles or StirSetup.from_recording(plan).particles
     batch = batch_of(liquid, effects, count, seed)
     targets.check_single(batch.single)
@@ -185,7 +184,7 @@ def _planned(recording: Recording, path: str | TimedPath | None) -> Recording:
         time=gripper.time,
         gripper=gripper,
         inclination=unseen,
-        attrs=MappingProxyType(named),
+        attrs=named,
         path=Path(name),
     )
 

@@ -21,7 +21,7 @@ def of_the_demo(**changes):
     recording = open_recording(files("bolfi_liquids.data") / RECORDING)
     settings = replace(CalibrationSettings(), **changes)
     stirring = stir_simulator([recording], settings.particles)
-    return CalibrationInputs(settings, default_prior(), stirring).record()
+    return CalibrationInputs(settings, default_prior(), stirring).record
 
 
 OTHERS = {

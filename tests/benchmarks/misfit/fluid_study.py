@@ -14,7 +14,6 @@ import time
 import warnings
 from functools import cache
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 import numpyro.distributions as dist
@@ -28,7 +27,7 @@ from bolfi_liquids.inference.simulations import Compute
 from kept import keep, results
 
 from bolfi_liquids import inference, models
-from bolfi_liquids.calibration.baseline import Clean, clean_residuals, usual_for
+from bolfi_liquids.calibration.model_error import Clean, clean_residuals, usual_for
 from bolfi_liquids.calibration.stirs import (
     camera_noise,
     effects_of,
@@ -156,9 +155,7 @@ def _record(path: str, truth: dict, rng: np.random.Generator) -> Recording:
 def _recording(path: str, inclination: np.ndarray) -> Recording:
     gripper = Trajectory(*PATHS[path])
     label = f"{path}-{hash(inclination.tobytes())}"
-    return Recording(
-        gripper.time, gripper, inclination, MappingProxyType(RIG), Path(f"{path}.nc"), label
-    )
+    return Recording(gripper.time, gripper, inclination, RIG, Path(f"{path}.nc"), label)
 
 
 @cache

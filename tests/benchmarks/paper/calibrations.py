@@ -18,8 +18,8 @@ from bolfi_liquids.models import Cups
 from numpy.typing import NDArray
 
 from bolfi_liquids import models
-from bolfi_liquids.calibration.draws import pick_draws
 from bolfi_liquids.calibration.engine_fit import engine_options
+from bolfi_liquids.calibration.result import pick_draws
 from bolfi_liquids.checks.sbc_pipelines import SAMPLING, SampleNoise
 from bolfi_liquids.inputs.prior import describe_prior
 from bolfi_liquids.inputs.settings import MIN_SIMULATIONS, PAPER_RULES

@@ -5,7 +5,7 @@ from typing import cast
 import numpy as np
 from xarray import Dataset, concat
 
-from bolfi_liquids.calibration.posterior_figure import AXIS_LABELS, contour_levels, grid_density
+from bolfi_liquids.calibration.figures import AXIS_LABELS, contour_levels, grid_density
 from bolfi_liquids.drawing import (
     GREY,
     INK,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import bolfi_liquids as bl
-from bolfi_liquids.calibration.bad_fit import bad_fit
+from bolfi_liquids.calibration.summary import bad_fit
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.recording import along_path, recording_dataset
 from bolfi_liquids.reporting.warnings import Results, warnings_of

@@ -12,8 +12,8 @@ from bolfi_liquids.models import stirring_error
 import bolfi_liquids as bl
 from bolfi_liquids import inference
 from bolfi_liquids.calibration import calibrate as calibrating
-from bolfi_liquids.calibration import check as checking
-from bolfi_liquids.calibration.check import check_of
+from bolfi_liquids.calibration import engine_fit as checking
+from bolfi_liquids.calibration.engine_fit import check_of
 from bolfi_liquids.calibration.model_error import SHORT_PART, model_error
 from bolfi_liquids.reporting.facts import fit_facts
 from bolfi_liquids.reporting.prose import prose

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bolfi_liquids.calibration.baseline import Clean, apart, usual_elsewhere, usual_for
+from bolfi_liquids.calibration.model_error import Clean, apart, usual_for
 from bolfi_liquids.calibration.stirs import camera_noise, held_out_noise, stir_experiment
 from bolfi_liquids.criticism.inputs import ComparedData, check_effects, open_inputs
 from bolfi_liquids.errors import Argument, InputError
@@ -219,7 +219,7 @@ def test_clean_recordings_of_the_same_path_say_where_it_errs(stirred):
     residual = 10.0 * SD * np.sin(np.linspace(0.0, 9.0, len(recording.time)))[:, None] * [1.0, 0.5]
     clean = [Clean(recording, residual, 1.0, 1)]
     stirring = stir_simulator([recording], 200)
-    same, elsewhere = usual_for(stirring, clean, 0.5), usual_elsewhere(stirring, clean, 0.5)
+    same, elsewhere = (usual_for(stirring, clean, 0.5, elsewhere=other) for other in (False, True))
     assert [one.same for one in same.clean] == [True]
     assert [one.same for one in elsewhere.clean] == [False]
     cameras = camera_noise([recording])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bolfi_liquids as bl
-from bolfi_liquids.calibration.bad_fit import bad_fit
+from bolfi_liquids.calibration.summary import bad_fit
 from bolfi_liquids.criticism.criticise import _learned_from
 from bolfi_liquids.criticism.result import calibration_to_pour
 from bolfi_liquids.drawing import new_figure

@@ -288,9 +288,9 @@ def test_warnings_of_stirs_that_are_cut_too_roughly():
 
 
 def test_warnings_of_a_wrong_frame_and_of_a_bad_fit(calibration):
-    from bolfi_liquids.calibration.bad_fit import bad_fit
+    from bolfi_liquids.calibration.summary import bad_fit
     from bolfi_liquids.inputs.bundled import bundled_recording
-    from bolfi_liquids.inputs.frame import frame_warnings
+    from bolfi_liquids.inputs.frame import recording_warnings
 
     recording = bundled_recording("glycerin")
     xz, yz = recording.inclination.T
@@ -299,7 +299,7 @@ def test_warnings_of_a_wrong_frame_and_of_a_bad_fit(calibration):
         path=Path("stir.nc"),
         inclination=np.column_stack([xz - yz, xz + yz]) / np.sqrt(2.0),
     )
-    (warning,) = frame_warnings([turned])
+    (warning,) = recording_warnings([turned])
     assert warning in QUOTED
     far = replace(calibration.summary, fit_rms_deg=2.1, noise_deg=0.24)
     assert str(bad_fit(far)) in QUOTED

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bolfi_liquids.inputs.bundled import RECORDED_LIQUIDS, bundled_recording
-from bolfi_liquids.inputs.frame import MAX_TURN_DEG, found_turn, frame_faults, frame_warnings
+from bolfi_liquids.inputs.frame import MAX_TURN_DEG, found_turn, frame_faults, recording_warnings
 from bolfi_liquids.inputs.recording import Trajectory
 
 PASSING, SHORT = "glycerin", 60
@@ -45,7 +45,7 @@ def test_what_was_recorded_in_one_frame_passes(liquid):
     recording = bundled_recording(liquid)
     for one in (recording, recording.first(SHORT), recording.first(recording.time.size // 2)):
         assert list(frame_faults(one)) == []
-    assert frame_warnings([recording]) == []
+    assert recording_warnings([recording]) == []
 
 
 @pytest.mark.parametrize("liquid", RECORDED_LIQUIDS)
@@ -77,7 +77,7 @@ def test_each_wrong_frame_is_found_and_its_cure_is_named(liquid, change, named):
     recording = seen_as(bundled_recording(liquid), change)
     (fault,) = frame_faults(recording)
     assert all(name in fault for name in named)
-    assert frame_warnings([recording]) == [f"{recording.path}: {fault}"]
+    assert recording_warnings([recording]) == [f"{recording.path}: {fault}"]
 
 
 def test_missing_samples_and_noise_do_no_harm(rng):

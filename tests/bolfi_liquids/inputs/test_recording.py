@@ -2,7 +2,6 @@
 
 from importlib.resources import files
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -282,7 +281,7 @@ def test_a_recording_that_has_neither_samples_nor_attributes_is_shown():
         nothing[:, 0],
         Trajectory(nothing[:, 0], nothing),
         nothing[:, :2],
-        MappingProxyType({}),
+        {},
         Path("a.nc"),
         "",
     )

@@ -1,7 +1,6 @@
 """Strokes of a stir."""
 
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 from bolfi_liquids.hardware.motion import circle, star
@@ -19,9 +18,7 @@ from bolfi_liquids.inputs.strokes import (
 
 def recorded(path) -> Recording:
     still = np.zeros((len(path.time), 2))
-    return Recording(
-        path.time, Trajectory(*path), still, MappingProxyType({}), Path("stir.nc"), "hash"
-    )
+    return Recording(path.time, Trajectory(*path), still, {}, Path("stir.nc"), "hash")
 
 
 def test_a_star_of_nine_points_has_its_strokes_and_a_rest_on_each_side():

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 import bolfi_liquids as bl
-from bolfi_liquids.inputs.bundled import RECORDED_LIQUIDS, bundled_recording
-from bolfi_liquids.inputs.frame import frame_warnings
+from bolfi_liquids.inputs.bundled import RECORDED_LIQUIDS, bundled_recording, write_template
+from bolfi_liquids.inputs.frame import recording_warnings
 from bolfi_liquids.inputs.table_import import (
     at_camera_times,
     import_table,
     open_table_map,
     outline,
-    write_template,
 )
 
 TRUTH = files("bolfi_liquids.data") / "water_v10.nc"
@@ -292,10 +291,10 @@ def test_an_import_may_be_made_again(tmp_path, written):
 
 
 def test_the_template_is_a_map_and_overwrites_nothing(tmp_path):
-    path = write_template(tmp_path / "columns.toml")
+    path = write_template("columns.toml", tmp_path / "columns.toml")
     assert open_table_map(path).columns.time[0].unit == "ms"
     with pytest.raises(ValueError, match="exists already"):
-        write_template(path)
+        write_template("columns.toml", path)
 
 
 def test_a_turned_cup_frame_is_warned_of_and_yaw_turns_it_back(tmp_path, written, truth):
@@ -313,7 +312,7 @@ def test_a_turned_cup_frame_is_warned_of_and_yaw_turns_it_back(tmp_path, written
     assert int(yaw) == pytest.approx(30, abs=6)  # water turns the stick by some degrees itself
     text = columns.read_text()
     columns.write_text("yaw_deg = -90\n" + text)  # the advice counts from what the map says
-    (warning,) = frame_warnings([import_table(table, columns, tmp_path / "worse.nc")])
+    (warning,) = recording_warnings([import_table(table, columns, tmp_path / "worse.nc")])
     (more,) = re.findall(r"add (-?\d+) to `yaw_deg`", warning)
     assert int(more) - 90 == pytest.approx(30, abs=6)
     columns.write_text("yaw_deg = 30\n" + text)

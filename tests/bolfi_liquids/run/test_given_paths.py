@@ -21,21 +21,11 @@ def bundled(name):
     return Path(str(files("bolfi_liquids.data"))) / name
 
 
-def test_a_recording_whose_copy_would_have_too_long_a_name_is_refused_first(
-    short_recording, settings, tmp_path
-):
-    long = tmp_path / f"{'a' * 245}.nc"
-    long.write_bytes(Path(short_recording).read_bytes())
-    with pytest.raises(InputError, match="248 bytes"):
-        bl.calibrate(long, out=tmp_path / "run", progress=False, **settings)
-    assert not (tmp_path / "run").exists()
-
-
 def given_nothing(out):
     """Each function that writes, with `out` for its path."""
     from bolfi_liquids.checks.sbc import check_sbc
     from bolfi_liquids.demo import run_demo
-    from bolfi_liquids.inputs import rigs, table_import
+    from bolfi_liquids.inputs.bundled import write_template
 
     stir = bundled("glycerin_v10.nc")
     return {
@@ -46,8 +36,8 @@ def given_nothing(out):
         "simulate stir": lambda: bl.simulate_stir(out=out, progress=False),
         "simulate pour": lambda: bl.simulate_pour(movie=out, progress=False),
         "import": lambda: bl.import_table(stir, "columns.toml", out),
-        "import --template": lambda: table_import.write_template(out),
-        "rig template": lambda: rigs.write_template(out),
+        "import --template": lambda: write_template("columns.toml", out),
+        "rig template": lambda: write_template("rig.toml", out),
     }
 
 

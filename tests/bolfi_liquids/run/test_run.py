@@ -99,12 +99,6 @@ def test_a_run_grows_in_the_field_that_may_grow(tmp_path):
         begin(tmp_path, RECORD, resume=True, growing=growing)
 
 
-def test_time_limits_are_listed_and_need_not_agree(tmp_path):
-    for limits in ([], [60.0], [5.0], [60.0]):
-        begin(tmp_path, RECORD | ({"timeouts": limits} if limits else {}), resume=True)
-    assert begin(tmp_path, resume=True).record == RECORD | {"timeouts": [60.0, 5.0]}
-
-
 @pytest.mark.parametrize("name", [SIMULATIONS, *RESULTS.values()])
 def test_results_without_settings_are_left_alone(tmp_path, name):
     (tmp_path / name).write_bytes(b"precious")
@@ -118,6 +112,20 @@ def test_a_record_that_is_no_toml_is_named(tmp_path, content):
     (tmp_path / RUN_TOML).write_bytes(content)
     with pytest.raises(InputError, match="run.toml: not TOML"):
         Run.open(tmp_path)
+
+
+def test_a_record_that_is_cut_off_is_named_though_it_is_toml(run):
+    text = (run.path / RUN_TOML).read_text(encoding="utf-8")
+    (run.path / RUN_TOML).write_text(text[: text.index("[versions]")], encoding="utf-8")
+    with pytest.raises(InputError, match=r"run\.toml: is cut off.*restore the file"):
+        bl.Calibration.open(run.path)
+
+
+def test_simulations_that_were_removed_are_missed(run, caplog):
+    (run.path / SIMULATIONS).unlink()
+    with run.bank() as bank:
+        assert len(bank) == 0
+    assert SIMULATIONS in caplog.text and "made again" in caplog.text
 
 
 def test_resuming_where_no_run_is_names_the_nearest(tmp_path):

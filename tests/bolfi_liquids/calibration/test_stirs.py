@@ -1,12 +1,11 @@
 """Windows of a stir."""
 
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 from bolfi_liquids.hardware.motion import Trajectory, star
 
-from bolfi_liquids.calibration.stir_windows import windows
+from bolfi_liquids.calibration.stirs import windows
 from bolfi_liquids.inputs.recording import Recording
 from bolfi_liquids.inputs.strokes import resting
 from bolfi_liquids.simulators import StirSimulator
@@ -14,7 +13,7 @@ from bolfi_liquids.simulators import StirSimulator
 
 def recorded(path: Trajectory) -> Recording:
     still = np.zeros((len(path.time), 2))
-    return Recording(path.time, path, still, MappingProxyType({}), Path("stir.nc"), "hash")
+    return Recording(path.time, path, still, {}, Path("stir.nc"), "hash")
 
 
 def test_windows_cover_every_sample_of_every_recording_once_by_stroke():
