@@ -35,6 +35,12 @@ class Layer(NamedTuple):
     cover: NDArray[np.float32]
     front: NDArray[np.float32]
 
+    @classmethod
+    def empty(cls, view: OrthographicView) -> "Layer":
+        """Nothing, of a picture's size."""
+        size = view.height, view.width
+        return cls(*(np.zeros(shape, np.float32) for shape in ((*size, 3), size, size)))
+
 
 def over(below: Picture, colour: Picture, cover: NDArray) -> Picture:
     """`colour` laid over a picture where it covers it."""
@@ -56,40 +62,30 @@ def through_liquid(
         stick: Seen through half of the liquid where it is behind the surface.
     """
     base = behind if stick is None else over(behind, stick.colour, stick.cover)
-    if liquid is None or not liquid.cover.any():
+    if liquid is None:
         return base
-    part = _window(liquid.cover)  # light takes time to compute
-    seen = VisibleSurface(*(field[part] for field in liquid))
-    bent = _bent(view, seen, part)
-    depth = seen.thickness[..., None]
+    part, bent = liquid.window, _bent(view, liquid)
+    depth = liquid.thickness[..., None]
     passed = behind[bent] * np.exp(-ABSORPTION * depth)
     if stick is not None:
         dyed = stick.colour[bent] * np.exp(-ABSORPTION * depth / 2.0)
         passed = over(passed, dyed, stick.cover[bent])
     passed += SCATTERED_COLOUR * (1.0 - np.exp(-SCATTERING * depth))
     picture = base.copy()
-    picture[part] = over(base[part], _lit(passed, seen.normal), seen.cover)
+    lit = over(base[part], _lit(passed, liquid.normal), liquid.cover)
     if stick is not None:
-        nearer = stick.cover * (stick.front > liquid.front)
-        picture = over(picture, stick.colour, nearer)
+        nearer = stick.cover[part] * (stick.front[part] > liquid.front)
+        lit = over(lit, stick.colour[part], nearer)
+    picture[part] = lit
     return picture
 
 
-def _window(cover: NDArray) -> tuple[slice, slice]:
-    """The rows and columns between the first and the last that are covered."""
-    some = (np.flatnonzero(cover.any(axis=axis)) for axis in (1, 0))
-    rows, columns = (slice(int(at[0]), int(at[-1]) + 1) for at in some)
-    return rows, columns
-
-
-def _bent(
-    view: OrthographicView, seen: VisibleSurface, part: tuple[slice, slice]
-) -> tuple[NDArray, NDArray]:
-    """Row and column of what is seen through each pixel of a window: towards the thicker side."""
+def _bent(view: OrthographicView, seen: VisibleSurface) -> tuple[NDArray, NDArray]:
+    """Row and column of what is seen through each pixel of the window: towards the thicker side."""
     bend = (
         REFRACTION_SHIFT * view.scale * np.minimum(seen.thickness, MAX_BENDING_DEPTH) * seen.cover
     )
-    rows, columns = np.mgrid[part]
+    rows, columns = np.mgrid[seen.window]
     moved = rows + bend * seen.normal[..., 1], columns - bend * seen.normal[..., 0]
     row, column = (
         np.rint(np.clip(at, 0, size - 1)).astype(int)

@@ -29,7 +29,7 @@ from .text import written
 from .view import OrthographicView
 
 if TYPE_CHECKING:
-    from ..models import Cups, Landings, PourFrames
+    from ..models import Cups, PourFrames
 
 PICTURE_SIZE = 480, 640
 AZIMUTH, ELEVATION = np.radians(12.0), np.radians(14.0)
@@ -71,18 +71,12 @@ def pour_view(cups: "Cups", distance: float, share: float = 1.0) -> Orthographic
 
 
 def pour_pictures(
-    frames: "PourFrames",
-    landings: "Landings",
-    cups: "Cups",
-    distance: float,
-    caption: Sequence[str],
-    share: float = 1.0,
+    frames: "PourFrames", cups: "Cups", distance: float, caption: Sequence[str], share: float = 1.0
 ) -> Iterator[NDArray[np.uint8]]:
     """A picture of each frame, of shape [height, width, 3].
 
     Args:
         frames: Of `models.pour_frames`.
-        landings: Of the same pour, by `models.landings`.
         cups: That they were made with.
         distance: From the lip to the receiver's axis [m].
         caption: Lines for a corner, beside time and fractions.
@@ -97,13 +91,15 @@ def pour_pictures(
     ):
         last = max(at - 1, 0)
         interval = float(time - frames.time[last])
-        below = landed(landings, int(passed[last]), int(passed[at]), interval, cups, distance)
+        below = landed(frames.landed, int(passed[last]), int(passed[at]), interval, cups, distance)
         source = source_glass(cups, float(angle))
         points = np.concatenate([position[: count - passed[at]], below.falling])
         picture = with_puddle(view, empty, below, cups, count)
-        picture = drawn(view, picture, _behind(view, source, receiver, below, cups))
+        picture = drawn(view, picture, _filled(view, receiver, level(below.caught, cups)))
+        picture = drawn(view, picture, glass_behind(source, view))
         picture = through_liquid(view, picture, surface(view, points, spacing, source))
-        picture = drawn(view, picture, glass_before(receiver, view) + glass_before(source, view))
+        for glass in (receiver, source):
+            picture = drawn(view, picture, glass_before(glass, view))
         spilled = passed[at] / count - below.caught
         lines = [
             f"{time:.2f} s   {np.degrees(angle):.0f}°",
@@ -112,16 +108,13 @@ def pour_pictures(
         yield written(picture, lines, caption)
 
 
-def _behind(view, source: Glass, receiver: Glass, below: Landed, cups: "Cups") -> list[Shape]:
-    """The receiver with its liquid, and the source's far wall."""
-    depth, shapes = level(below.caught, cups), glass_behind(receiver, view)
-    if depth > 0.0:
-        near = ring(receiver, 0.0, view, "near"), ring(receiver, depth, view, "near")[::-1]
-        shapes += [
-            Shape(np.concatenate(near), DYED),
-            Shape(ring(receiver, depth, view), SHINING),
-        ]
-    return shapes + glass_behind(source, view)
+def _filled(view: OrthographicView, receiver: Glass, depth: float) -> list[Shape]:
+    """The receiver's far wall, and its liquid up to a level [m]."""
+    if depth == 0.0:
+        return glass_behind(receiver, view)
+    near = ring(receiver, 0.0, view, "near"), ring(receiver, depth, view, "near")[::-1]
+    liquid = Shape(np.concatenate(near), DYED), Shape(ring(receiver, depth, view), SHINING)
+    return [*glass_behind(receiver, view), *liquid]
 
 
 def with_puddle(

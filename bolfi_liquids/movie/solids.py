@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter
 
 from .light import Layer, Picture, over
 from .surface import Glass
-from .view import OrthographicView
+from .view import OrthographicView, window
 
 LINE_SUPERSAMPLING = 2  # lines are drawn this many times finer than shown
 EDGE, FAINT = (92, 112, 130, 210), (92, 112, 130, 110)
@@ -31,13 +31,16 @@ class Shape(NamedTuple):
 
 def drawn(view: OrthographicView, below: Picture, shapes: Sequence[Shape]) -> Picture:
     """A picture with shapes over it, in their order."""
-    if not shapes:
-        return below
-    size = LINE_SUPERSAMPLING * view.width, LINE_SUPERSAMPLING * view.height
-    sheet = Image.new("RGBA", size)
-    for shape in shapes:
-        at = [tuple(p) for p in LINE_SUPERSAMPLING * (view.pixels(shape.points) + 0.5)]
-        own = Image.new("RGBA", size, shape.colour[:3] + (0,)) if not shape.width else None
+    places = [view.pixels(shape.points) for shape in shapes]
+    part = window(view, np.concatenate(places), max(shape.width for shape in shapes))
+    rows, columns = part
+    size = columns.stop - columns.start, rows.stop - rows.start
+    finer = tuple(LINE_SUPERSAMPLING * pixels for pixels in size)
+    corner = np.array([columns.start, rows.start]) - 0.5
+    sheet = Image.new("RGBA", finer)
+    for place, shape in zip(places, shapes, strict=True):
+        at = [tuple(p) for p in LINE_SUPERSAMPLING * (place - corner)]
+        own = Image.new("RGBA", finer, shape.colour[:3] + (0,)) if not shape.width else None
         if own is None:
             ImageDraw.Draw(sheet).line(at, fill=shape.colour, width=shape.width, joint="curve")
         else:
@@ -45,7 +48,9 @@ def drawn(view: OrthographicView, below: Picture, shapes: Sequence[Shape]) -> Pi
             sheet = Image.alpha_composite(sheet, own)
     # premultiplied, so that no colour of empty pixels bleeds into the edges
     small = np.asarray(sheet.convert("RGBa").reduce(LINE_SUPERSAMPLING), np.float32) / 255.0
-    return below * (1.0 - small[..., 3:]) + small[..., :3]
+    picture = below.copy()
+    picture[part] = below[part] * (1.0 - small[..., 3:]) + small[..., :3]
+    return picture
 
 
 def ring(glass: Glass, height: float, view: OrthographicView, part: str = "all") -> NDArray:
@@ -86,21 +91,24 @@ def glass_before(glass: Glass, view: OrthographicView) -> list[Shape]:
 
 def stick_layer(view: OrthographicView, pivot: NDArray, tip: NDArray, radius: float) -> Layer:
     """A round stick from the pivot to the tip."""
-    start, end = view.camera(np.stack([tip, pivot]))
+    ends = np.stack([tip, pivot])
+    start, end = view.camera(ends)
+    part = window(view, view.pixels(ends), radius * view.scale)
     right, up = view.metres()
     along = end[:2] - start[:2]
     length = np.linalg.norm(along)
     along /= length
-    x, y = right - start[0], up - start[1]
+    x, y = right[part[1]] - start[0], up[part[0]] - start[1]
     share = np.clip((x * along[0] + y * along[1]) / length, 0.0, 1.0)
     dx, dy = x - share * length * along[0], y - share * length * along[1]
     apart = np.hypot(dx, dy)
-    cover = np.clip((radius - apart) * view.scale + 0.5, 0.0, 1.0)
     round_off = np.sqrt(np.maximum(1.0 - (apart / radius) ** 2, 0.0))
     lit = 0.55 + 0.45 * round_off - 0.18 * (dx * along[1] - dy * along[0]) / radius
-    front = start[2] + share * (end[2] - start[2]) + radius * round_off
-    colour = np.clip(lit[..., None] * STICK_COLOUR, 0.0, 1.0)
-    return Layer(*(part.astype(np.float32) for part in (colour, cover, front)))
+    layer = Layer.empty(view)
+    layer.cover[part] = np.clip((radius - apart) * view.scale + 0.5, 0.0, 1.0)
+    layer.front[part] = start[2] + share * (end[2] - start[2]) + radius * round_off
+    layer.colour[part] = np.clip(lit[..., None] * STICK_COLOUR, 0.0, 1.0)
+    return layer
 
 
 def room(view: OrthographicView, cups: Sequence[Glass]) -> Picture:

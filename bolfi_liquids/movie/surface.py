@@ -1,10 +1,7 @@
 """From particles to the surface of the liquid, as a camera sees it.
 
-Particles are smeared over a grid that is aligned with the camera, so that what is seen is the
-first cell along its last axis in which there is liquid enough. This takes 0.3 s of processor time a
-picture of 5000 particles; scikit-image (56 MB) finds a mesh in the same grid, which matplotlib then
-draws in 0.95 s without depth, thickness or smooth normals, and VTK, which has them, is a wheel of
-140 MB.
+All of it is computed in the picture's own pixels (van der Laan, Green and Sainz 2009): no grid in
+space, no mesh. It takes some 10 ms of processor time for a picture of 5000 particles.
 """
 
 from dataclasses import dataclass
@@ -12,19 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import affine_transform, gaussian_filter, map_coordinates
+from scipy.ndimage import distance_transform_edt, gaussian_filter, grey_dilation
 
-from .view import OrthographicView
+from .view import OrthographicView, window
 
-CELLS_PER_SPACING = 2.5  # grid cells a particle spacing
-MIN_CELL_PIXELS = 2.0  # of a grid cell: a small picture needs no finer one
-SMEAR_SD = 0.9  # sd of a smeared particle, by the spacing: particles on a grid lie unevenly
-SURFACE_LEVEL = 0.5  # of the rest density: here is the surface, where it is flat
 DROP_RADIUS = (3.0 / (4.0 * np.pi)) ** (1.0 / 3.0)  # of a particle's volume, by the spacing
-MIN_PARTICLE_DENSITY = SURFACE_LEVEL * np.exp(0.5 * (DROP_RADIUS / SMEAR_SD) ** 2)
-"""Least density at a particle, so that a single one is a drop of its own volume."""
-SURFACE_BLUR = 1.0  # cells
-LEAST_SHARE = 0.2  # of a smeared particle that is inside the cup's corners
+BRIDGED = 0.8  # from each of two drops [spacing]: the liquid between nearer ones is whole
+SMOOTHED = 0.7  # sd by which surface and thickness are smoothed [spacing]
 
 
 @dataclass(frozen=True)
@@ -42,64 +33,35 @@ class Glass:
     floor: NDArray
     axis: NDArray
 
-    def within(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Distance of points [..., 3] from the side, inwards, and from the floor, upwards [m]."""
+    def clear_of_walls(self, points: NDArray, distance: float) -> NDArray[np.float64]:
+        """Points [n, 3]; those in the cup are moved to be this far [m] from side and floor."""
         offset = points - self.floor
         along = offset @ self.axis
-        across = np.sqrt(np.maximum(np.sum(offset * offset, axis=-1) - along * along, 0.0))
-        return self.radius - across, along
+        across = offset - along[:, None] * self.axis
+        from_axis = np.linalg.norm(across, axis=1)
+        inside = (from_axis < self.radius) & (along > 0.0) & (along < self.height)
+        inwards = np.minimum((self.radius - distance) / np.maximum(from_axis, 1e-9), 1.0)
+        up = np.maximum(along, distance)
+        moved = self.floor + inwards[:, None] * across + up[:, None] * self.axis
+        return np.where(inside[:, None], moved, points)
 
 
 class VisibleSurface(NamedTuple):
-    """What each pixel shows of the liquid, arrays of shape [height, width].
+    """What the pixels of a window of the picture show of the liquid.
 
     Attributes:
-        cover: Share of the pixel behind the liquid, 0 to 1.
+        window: Rows and columns of the picture.
+        cover: Share of the pixel behind the liquid, 0 to 1, shape [rows, columns].
         front: How far towards the camera the surface is [m], of the view's centre.
-        normal: Of the surface, [height, width, 3]: right, up and towards the camera.
+        normal: Of the surface, [rows, columns, 3]: right, up and towards the camera.
         thickness: Of the liquid along the line of sight [m].
     """
 
+    window: tuple[slice, slice]
     cover: NDArray
     front: NDArray
     normal: NDArray
     thickness: NDArray
-
-
-class _Grid(NamedTuple):
-    """Cells along right, up and away from the camera; `origin` is the first one's centre [m]."""
-
-    origin: NDArray
-    cell: float
-    shape: tuple[int, int, int]
-
-    @classmethod
-    def around(cls, points: NDArray, spacing: float, pixel: float) -> "_Grid":
-        cell = max(spacing / CELLS_PER_SPACING, MIN_CELL_PIXELS * pixel)
-        reach = 3.0 * SMEAR_SD * spacing
-        # at multiples of the cell, so that liquid at rest does not shimmer
-        low = np.floor((points.min(axis=0) - reach) / cell)
-        high = np.ceil((points.max(axis=0) + reach) / cell)
-        right, up, away = (int(n) + 1 for n in high - low)
-        return cls(low * cell, cell, (right, up, away))
-
-    def smeared(self, points: NDArray, weights: NDArray, spacing: float) -> NDArray:
-        """Density of weighted particles, 1 where they are `spacing` apart."""
-        at = (points - self.origin) / self.cell
-        first = np.floor(at).astype(int)
-        part = at - first
-        total = np.zeros(int(np.prod(self.shape)))
-        for corner in np.ndindex(2, 2, 2):
-            cells = np.ravel_multi_index(tuple((first + corner).T), self.shape)
-            share = np.prod(np.where(corner, part, 1.0 - part), axis=1)
-            total += np.bincount(cells, share * weights, len(total))
-        density = (spacing / self.cell) ** 3 * total.reshape(self.shape)
-        sd = SMEAR_SD * spacing / self.cell
-        return gaussian_filter(density.astype(np.float32), sd, mode="constant", truncate=3.0)
-
-    def centres(self) -> NDArray:
-        axes = (o + self.cell * np.arange(n) for o, n in zip(self.origin, self.shape, strict=True))
-        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
 
 def surface(
@@ -107,88 +69,52 @@ def surface(
 ) -> VisibleSurface | None:
     """The liquid's surface.
 
+    Each particle is a drop of its own volume. Drops are blown up until they meet, and the whole
+    shrinks by as much again: liquid that is together is smooth, and a single drop keeps its size.
+
     Args:
         view: The camera.
         points: Particles in the scene [m], shape [n, 3].
         spacing: Between them [m].
-        glass: The cup that may hold them; at its walls the liquid ends, not before.
+        glass: The cup that may hold them; its walls end the liquid.
 
     Returns:
-        None if there are no points.
+        None if no point is in the picture.
     """
-    if not len(points):
+    drop, shrunk = DROP_RADIUS * spacing, BRIDGED * spacing
+    blown, pixels = drop + shrunk, view.scale * spacing
+    clear = glass.clear_of_walls(points, drop)
+    places, reach = view.pixels(clear), int(np.ceil(view.scale * blown)) + 1
+    column, row = np.rint(places).astype(int).T
+    seen = (column >= 0) & (column < view.width) & (row >= 0) & (row < view.height)
+    if not seen.any():
         return None
-    seen = view.camera(points) * (1.0, 1.0, -1.0)  # away from the camera
-    grid = _Grid.around(seen, spacing, 1.0 / view.scale)
-    density = _density(view, points, seen, grid, (spacing, glass))
-    return _looked_at(view, grid, density)
+    part = window(view, places[seen], reach)
+    at = row[seen] - part[0].start, column[seen] - part[1].start
+    shape = part[0].stop - part[0].start, part[1].stop - part[1].start
+
+    nearest, count = np.full(shape, -np.inf), np.zeros(shape)
+    np.maximum.at(nearest, at, view.camera(clear[seen])[:, 2])
+    np.add.at(count, at, 1.0)
+    away = distance_transform_edt(np.isinf(nearest)) / view.scale
+    whole = away < blown
+    # how far inside the blown-up liquid's edge each pixel is; beyond the picture it goes on
+    inwards = distance_transform_edt(np.pad(whole, 1, mode="edge"))[1:-1, 1:-1]
+    cover = np.clip(inwards - view.scale * shrunk, 0.0, 1.0)
+    # a paraboloid on top of each particle, which two passes along the axes make
+    bulge = -((np.arange(-reach, reach + 1) / view.scale) ** 2) / (2.0 * blown)
+    for kernel in (bulge[:, None], bulge[None, :]):
+        nearest = grey_dilation(nearest, structure=kernel, mode="constant", cval=-np.inf)
+    front = _smoothed(np.where(whole, nearest + drop, 0.0), whole, SMOOTHED * pixels)
+    down, right = np.gradient(front, 1.0 / view.scale)
+    normal = np.stack([-right, down, np.ones(shape)], axis=-1)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    together = spacing * pixels**2 * gaussian_filter(count, SMOOTHED * pixels)
+    thickness = np.maximum(together, 2.0 * drop)
+    return VisibleSurface(part, cover, front, normal, thickness)
 
 
-def _density(view: OrthographicView, points, seen, grid: _Grid, given) -> NDArray:
-    """Density over the grid: full up to the glass, and none beyond on account of what is inside."""
-    spacing, glass = given
-    side, up = glass.within(points)
-    inside = (side > 0.0) & (up > 0.0) & (up < glass.height)
-    cell_side, cell_up = glass.within(view.world(grid.centres() * (1.0, 1.0, -1.0)))
-    sd = SMEAR_SD * spacing
-    held = _share_within(cell_side / sd) * _share_within(cell_up / sd)
-    near = (np.minimum(cell_side, cell_up) > -grid.cell) & (cell_up < glass.height)
-    share = np.where(near, np.maximum(held, LEAST_SHARE), 1.0)
-    whole = grid.smeared(seen, np.ones(len(points)), spacing) / share
-    places = ((seen - grid.origin) / grid.cell).T
-    found = map_coordinates(whole, places, order=1)
-    weights = np.maximum(1.0, MIN_PARTICLE_DENSITY / np.maximum(found, 1e-3))
-    whole = grid.smeared(seen, weights, spacing) / share
-    within = np.clip(np.minimum(cell_side, cell_up) / grid.cell + 0.5, 0.0, 1.0)
-    if inside.all():
-        beyond = np.zeros((), np.float32)
-    else:
-        beyond = grid.smeared(seen[~inside], weights[~inside], spacing)
-    blended = within * whole + (1.0 - within) * beyond
-    return np.where(cell_up < glass.height, blended, whole).astype(np.float32)
-
-
-def _share_within(distance: NDArray) -> NDArray:
-    """Share of a smeared particle, `distance` [sd] inside a wall, that is inside it; a ramp near
-    the normal distribution function."""
-    return np.clip(0.5 + distance / 2.5, 0.0, 1.0)
-
-
-def _looked_at(view: OrthographicView, grid: _Grid, density: NDArray) -> VisibleSurface:
-    """The grid's columns, each as one line of sight, brought to the picture's pixels."""
-    solid = density > SURFACE_LEVEL
-    crossing = solid.any(axis=2)
-    first = np.where(crossing, solid.argmax(axis=2), density.argmax(axis=2))
-    before = np.maximum(first - 1, 0)
-
-    def at(values: NDArray, index: NDArray) -> NDArray:
-        return np.take_along_axis(values, index[..., None], axis=2)[..., 0]
-
-    here, there = at(density, first), at(density, before)
-    step = np.where(crossing, (here - SURFACE_LEVEL) / np.maximum(here - there, 1e-6), 0.0)
-    front = -(grid.origin[2] + grid.cell * (first - np.clip(step, 0.0, 1.0)))
-    # smoother than the surface, or light would show the grid
-    soft = gaussian_filter(density, SURFACE_BLUR, mode="nearest")
-    slope = np.stack([-at(np.gradient(soft, axis=axis), first) for axis in range(3)], axis=-1)
-    slope[..., 2] *= -1.0
-    amount = np.clip(density / (2.0 * SURFACE_LEVEL), 0.0, 1.0)
-    thickness = grid.cell * amount.sum(axis=2)
-    most = density.max(axis=2)
-
-    right, up = view.metres()
-    pixel = 1.0 / view.scale / grid.cell  # in cells
-    offset = np.array([(up[0, 0] - grid.origin[1]), (right[0] - grid.origin[0])]) / grid.cell
-
-    def to_picture(values: NDArray, order: int = 1) -> NDArray:
-        rows = values.T.astype(np.float32)
-        size = view.height, view.width
-        return affine_transform(rows, (-pixel, pixel), offset, size, order=order)  # type: ignore[arg-type]
-
-    most, front, thickness = to_picture(most, 3), to_picture(front), to_picture(thickness)
-    normal = np.stack([to_picture(slope[..., axis]) for axis in range(3)], axis=-1)
-    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-    # a pixel is covered by how far inside the contour its centre is, in pixels
-    across, down = np.gradient(most)
-    steep = np.hypot(across, down)
-    cover = np.clip((most - SURFACE_LEVEL) / np.maximum(steep, 1e-3) + 0.5, 0.0, 1.0)
-    return VisibleSurface(cover, front, normal, thickness)
+def _smoothed(values: NDArray, known: NDArray, sd: float) -> NDArray:
+    """Values smoothed over the pixels in which they are known."""
+    share = gaussian_filter(known.astype(float), sd)
+    return gaussian_filter(values, sd) / np.maximum(share, 1e-6)

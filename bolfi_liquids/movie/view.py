@@ -53,3 +53,13 @@ class OrthographicView:
         right = (np.arange(self.width) - (self.width - 1) / 2.0) / self.scale
         up = ((self.height - 1) / 2.0 - np.arange(self.height)) / self.scale
         return right, up[:, None]
+
+
+def window(view: OrthographicView, places: NDArray, margin: float) -> tuple[slice, slice]:
+    """Rows and columns of the picture around places [n, 2], columns and rows as `pixels` gives."""
+    reach = int(np.ceil(margin)) + 1
+    low = np.clip(np.floor(places.min(axis=0)).astype(int) - reach, 0, (view.width, view.height))
+    high = np.clip(
+        np.ceil(places.max(axis=0)).astype(int) + reach + 1, low, (view.width, view.height)
+    )
+    return slice(low[1], high[1]), slice(low[0], high[0])

@@ -1,33 +1,36 @@
-"""Moving pictures of the page: the stirring and the chosen pour, of a few liquids of the posterior.
+"""Films of the page: the stirring and the chosen pour, of a few liquids of the posterior.
 
-Each is a film in the folder `moving` of the run, simulated and drawn as by `simulate --movie`. Its
+Each is a file in the folder `moving` of the run, simulated and drawn as by `simulate --movie`. Its
 name ends with a digest of what is simulated for it; a film that is there is not made again.
 """
 
+import base64
 import json
-from collections.abc import Iterator, Mapping
-from concurrent.futures import Executor
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator
+from contextlib import nullcontext
+from functools import partial
 from hashlib import sha256
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..files import write_whole
 from ..inputs.cups import kept_cups
-from ..inputs.recording import Recording
 from ..movie.file import encoded
 from ..pouring.landed_pours import Parcels
 from ..progress import progress_bar
-from ..run.run import MOVING, as_json
+from ..run.run import MOVING
 from ..seeds import Phase, simulation_seeds
-from ..simulators import RATE, PourSimulator, stir_simulator
+from ..simulators import RATE, PourSimulator, StirSimulator, stir_simulator
 from ..wording import spoken, with_unit
 
 if TYPE_CHECKING:
     from ..calibration.result import Calibration
     from ..inference.simulations import Compute
+    from ..models import PourFrames, StirFrames
     from ..pouring.result import Pour
 
 N_DRAWS_SHOWN = 3
@@ -43,101 +46,91 @@ FILM_SHARE = 0.6
 """Of the size of a movie's pictures: three stand side by side."""
 
 
-class Draw(NamedTuple):
-    """A liquid of the posterior with its effects, and the seed with which it is shown."""
-
-    theta: dict[str, float]
-    seed: int
-
-    def __str__(self) -> str:
-        shown = self.theta.items()
-        return ", ".join(f"{spoken(name)} {with_unit(name, value)}" for name, value in shown)
-
-
 class StirScene(NamedTuple):
-    """A stir that can be shown, of any liquid.
+    """The stir of a recording, of any liquid."""
 
-    Attributes:
-        recording: Whose path is stirred.
-        particles: Number of particles; 0 for the default.
-        timeout: Seconds that one simulation may take; None sets no limit.
-    """
-
-    recording: Recording
-    particles: int
-    timeout: float | None
+    simulator: StirSimulator
 
     name = "stir"
 
-    @property
-    def content(self) -> dict[str, Any]:
-        """All that is shown besides the liquid."""
-        return {"recording": self.recording.hash, "particles": self.particles}
+    def frames(self, theta: dict[str, float], seed: int) -> "StirFrames":
+        """Simulate the stir of one liquid."""
+        return self.simulator.frames(theta, seed, FILM_RATE)
 
-    def __call__(self, draw: Draw) -> bytes:
-        """A film in WebP; empty where the simulation diverges."""
+    def pictures(self, frames: "StirFrames") -> Iterator[NDArray[np.uint8]]:
+        """Draw each frame."""
         from ..movie.stir import stir_pictures
 
-        simulator = stir_simulator([self.recording], self.particles)
-        (setup,) = simulator.setups
-        with _limited(self.timeout):
-            frames = simulator.frames(draw.theta, draw.seed, FILM_RATE)
-        if not np.isfinite(frames.tip).all():
-            return b""
-        return encoded(stir_pictures(frames, setup, (), FILM_SHARE), FILM_RATE)
+        return stir_pictures(frames, self.simulator.setups[0], (), FILM_SHARE)
 
 
 class PourScene(NamedTuple):
-    """A pour that can be shown, of any liquid.
+    """A pour at an angular velocity [rad/s] and a distance [m], of any liquid."""
 
-    Attributes:
-        settings: Of source and receiver, see `Cups.settings`.
-        angular_velocity, distance: The chosen action [rad/s], [m].
-        density: Of the liquid [kg/m3].
-        timeout: Seconds that one simulation may take; None sets no limit.
-    """
-
-    settings: dict[str, Any]
+    simulator: PourSimulator
     angular_velocity: float
     distance: float
-    density: float
-    timeout: float | None
 
     name = "pour"
 
-    @property
-    def content(self) -> dict[str, Any]:
-        """All that is shown besides the liquid."""
-        return self._replace(timeout=None)._asdict()
+    def frames(self, theta: dict[str, float], seed: int) -> "PourFrames":
+        """Simulate the pour of one liquid."""
+        return self.simulator.frames(theta | {RATE: self.angular_velocity}, seed, FILM_RATE)
 
-    def __call__(self, draw: Draw) -> bytes:
-        """A film in WebP; empty where the simulation diverges."""
+    def pictures(self, frames: "PourFrames") -> Iterator[NDArray[np.uint8]]:
+        """Draw each frame."""
         from ..movie.pour import pour_pictures
 
-        cups = kept_cups(self.settings)
-        simulator = PourSimulator(cups, self.density, Parcels())
-        theta = draw.theta | {RATE: self.angular_velocity}
-        with _limited(self.timeout):
-            frames = simulator.frames(theta, draw.seed, FILM_RATE)
-        result = frames.landed.into(self.distance, cups.receiver.radius)
-        if not np.isfinite(result.spilled).all():
-            return b""
-        pictures = pour_pictures(frames, frames.landed, cups, self.distance, (), FILM_SHARE)
-        return encoded(pictures, FILM_RATE)
+        return pour_pictures(frames, self.simulator.cups, self.distance, (), FILM_SHARE)
 
 
 class Film(NamedTuple):
     """A film of a run.
 
     Attributes:
-        scene: Makes it.
-        draw: The liquid that it shows.
-        path: Its file.
+        scene: What happens.
+        theta: Of the liquid: its parameters, and the coefficients of effects.
+        seed: Of the packing.
+        folder: Where it is kept.
     """
 
     scene: StirScene | PourScene
-    draw: Draw
-    path: Path
+    theta: dict[str, float]
+    seed: int
+    folder: Path
+
+    @property
+    def liquid(self) -> str:
+        """The liquid in words."""
+        shown = self.theta.items()
+        return ", ".join(f"{spoken(name)} {with_unit(name, value)}" for name, value in shown)
+
+    @property
+    def path(self) -> Path:
+        """Its file, in WebP; empty if the simulation diverges."""
+        from ..models import MODEL_VERSION
+
+        simulator, *action = self.scene
+        simulated = [simulator.identity, action, self.theta, self.seed]
+        shown = json.dumps([MODEL_VERSION, FILM_RATE, FILM_SHARE, *simulated])
+        digest = sha256(shown.encode()).hexdigest()[:12]
+        return self.folder / f"{self.scene.name}-{digest}.webp"
+
+    @property
+    def moving(self) -> str:
+        """The film, as the URL of an image."""
+        return _url(self.path.read_bytes())
+
+    @property
+    def still(self) -> str:
+        """The picture in its middle, as a URL."""
+        from PIL import Image
+
+        picture = BytesIO()
+        with Image.open(self.path) as film:
+            film.seek(film.n_frames // 2)  # type: ignore[attr-defined]
+            film.convert("RGB").save(picture, "WEBP", quality=85)
+        return _url(picture.getvalue())
 
 
 def films_of(
@@ -159,26 +152,26 @@ def films_of(
         RuntimeError: A simulation took longer than the timeout.
     """
     settings, whole = calibration.record["settings"], calibration.run.recordings[0]
-    recording = whole.first(int(np.sum(whole.time - whole.time[0] <= MAX_STIR_SECONDS)))
-    scenes: list[StirScene | PourScene] = [
-        StirScene(recording, int(settings["particles"]), compute.timeout)
-    ]
+    start = whole.first(int(np.sum(whole.time - whole.time[0] <= MAX_STIR_SECONDS)))
+    scenes: list[Any] = [StirScene(stir_simulator([start], int(settings["particles"])))]
     if pour is not None:
-        cups, density = json.loads(pour.tree.attrs["cups"]), calibration.liquid_density
-        action = pour.chosen.angular_velocity, pour.chosen.distance
-        scenes.append(PourScene(cups, *action, density, compute.timeout))
+        cups, action = kept_cups(json.loads(pour.tree.attrs["cups"])), pour.chosen
+        simulator = PourSimulator(cups, calibration.liquid_density, Parcels())
+        scenes.append(PourScene(simulator, action.angular_velocity, action.distance))
     seed, folder = int(settings["seed"]), calibration.path / MOVING
-    draws = _draws(calibration.draws(N_DRAWS_SHOWN, seed), seed)
+    drawn = calibration.draws(N_DRAWS_SHOWN, seed)
+    seeds = simulation_seeds(seed, Phase.MOVING_PICTURES, N_DRAWS_SHOWN)
+    thetas = [{name: float(of[at]) for name, of in drawn.items()} for at in range(len(seeds))]
     films = [
-        Film(scene, draw, folder / f"{scene.name}-{number}-{_digest(scene, draw)}.webp")
+        Film(scene, theta, int(own), folder)
         for scene in scenes
-        for number, draw in enumerate(draws, start=1)
+        for theta, own in zip(thetas, seeds, strict=True)
     ]
     folder.mkdir(exist_ok=True)
     missing = [film for film in films if not film.path.exists()]
     try:
         with progress_bar("moving pictures", len(missing), shown=progress) as advance:
-            for film, content in zip(missing, _made(missing, compute.executor), strict=True):
+            for film, content in zip(missing, _made(missing, compute), strict=True):
                 write_whole(film.path, lambda at, content=content: at.write_bytes(content))
                 advance(1)
     except TimeoutError as err:
@@ -193,38 +186,26 @@ def films_of(
     return films
 
 
-def _digest(scene: StirScene | PourScene, draw: Draw) -> str:
-    """Of all that a film shows."""
-    from ..models import MODEL_VERSION
-
-    common = {
-        "model": MODEL_VERSION,
-        "rate": FILM_RATE,
-        "share": FILM_SHARE,
-        "seconds": MAX_STIR_SECONDS,
-    }
-    shown = as_json({**common, **scene.content, **draw._asdict()})
-    return sha256(shown.encode()).hexdigest()[:12]
-
-
-def _draws(theta: Mapping[str, np.ndarray], seed: int) -> list[Draw]:
-    """Each draw of theta, values of shape (draws,), with a seed."""
-    seeds = simulation_seeds(seed, Phase.MOVING_PICTURES, N_DRAWS_SHOWN)
-    each = [{name: float(of[at]) for name, of in theta.items()} for at in range(len(seeds))]
-    return [Draw(*one) for one in zip(each, seeds, strict=True)]
-
-
-def _made(films: list[Film], workers: Executor | None) -> Iterator[bytes]:
+def _made(films: list[Film], compute: "Compute") -> Iterator[bytes]:
     """The content of each film, in order; an executor begins with all of them at once."""
-    return map(_shown, films) if workers is None else workers.map(_shown, films)
+    simulate = map if compute.executor is None else compute.executor.map
+    return simulate(partial(_content, timeout=compute.timeout), films)
 
 
-def _shown(film: Film) -> bytes:
-    return film.scene(film.draw)
+def _content(film: Film, timeout: float | None) -> bytes:
+    """A film in WebP; empty if the simulation diverges.
 
-
-def _limited(timeout: float | None) -> AbstractContextManager[None]:
-    """Inside, a simulation that takes longer raises TimeoutError."""
+    Raises:
+        TimeoutError: The simulation took longer than the timeout.
+    """
     from ..models import time_limit
 
-    return nullcontext() if timeout is None else time_limit(timeout)
+    with nullcontext() if timeout is None else time_limit(timeout):
+        frames: Any = film.scene.frames(film.theta, film.seed)
+    if np.isnan(frames.position[0]).all():
+        return b""
+    return encoded(film.scene.pictures(frames), FILM_RATE)
+
+
+def _url(content: bytes) -> str:
+    return f"data:image/webp;base64,{base64.b64encode(content).decode()}"

@@ -1,11 +1,9 @@
 """report.html: one file that shows a run, without anything from outside it."""
 
-import base64
 import json
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from importlib.resources import files
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +18,7 @@ from ..pouring.figures import pour_figure
 from ..run.compute import open_compute
 from ..run.run import REPORT, RUN_TOML, Run, RunOrPath
 from .facts import held_out_of
+from .films import films_of
 from .prose import prose
 from .warnings import Results
 
@@ -79,17 +78,15 @@ def written(
         lstrip_blocks=True,
     )
     facts = results.facts
-    films = partial(_films, results, compute, progress) if moving else dict
     with ThreadPoolExecutor(1) as thread:
-        # workers make films while figures are drawn; without any, Taichi stays in this thread
-        made = None if compute.executor is None else thread.submit(films)
-        figures = figures_of(results)
-        shown = films() if made is None else made.result()
+        drawn = thread.submit(figures_of, results)  # while this thread, or workers, make films
+        films = films_of(results.latest, results.pour, compute, progress=progress) if moving else []
+        figures = drawn.result()
     page = environment.get_template(PAGE_TEMPLATE).render(
         **facts,
         prose=partial(prose, facts=facts),
         figures=figures,
-        films=shown,
+        films=[film for film in films if film.path.stat().st_size],  # else it diverged
         made_from=_made_from(results),
         style=(files("bolfi_liquids.data") / STYLE).read_text(encoding="utf-8"),
         record=results.calibration.record,
@@ -130,33 +127,6 @@ def _criticism_figures(criticism: Criticism) -> dict[str, "Figure"]:
         drawn[f"scores-{name}"] = score_plot(source)
         drawn[f"confusion-{name}"] = confusion_plot(source)
     return {name: plot.figure for name, plot in drawn.items()}
-
-
-def _films(results: Results, compute: "Compute", progress: bool) -> dict[str, list[dict[str, str]]]:
-    """The films of the latest posterior and the pour: caption, a still and the film, as URLs."""
-    from .films import films_of
-
-    shown: dict[str, list[dict[str, str]]] = {}
-    for film in films_of(results.latest, results.pour, compute, progress=progress):
-        if content := film.path.read_bytes():
-            each = {"liquid": str(film.draw), "still": _url(_still(content)), "film": _url(content)}
-            shown.setdefault(film.scene.name, []).append(each)
-    return shown
-
-
-def _still(content: bytes) -> bytes:
-    """The picture in the middle of a film."""
-    from PIL import Image, ImageSequence
-
-    picture = BytesIO()
-    with Image.open(BytesIO(content)) as film:
-        pictures = ImageSequence.all_frames(film)
-    pictures[len(pictures) // 2].convert("RGB").save(picture, "WEBP", quality=85)
-    return picture.getvalue()
-
-
-def _url(content: bytes) -> str:
-    return f"data:image/webp;base64,{base64.b64encode(content).decode()}"
 
 
 def _made_from(results: Results) -> dict[str, str]:

@@ -14,7 +14,7 @@ from ..simulators import RATE, PourSimulator, StirSimulator
 from .batch import failures_raised, theta_of
 
 if TYPE_CHECKING:
-    from ..models import Landings, PourAction
+    from ..models import PourAction
 
 
 def film_stir(movie: Path, described: Described, simulator: StirSimulator, progress: bool) -> None:
@@ -34,7 +34,6 @@ def film_pour(
     described: Described,
     simulator: PourSimulator,
     action: "PourAction",
-    landings: "Landings",
     progress: bool,
 ) -> None:
     """Simulate a pour again, and write what it looks like."""
@@ -46,7 +45,7 @@ def film_pour(
         frames = simulator.frames(theta, described.seed, PICTURE_RATE)
     turn = f"{np.degrees(rate):g}°/s, lip to axis {100 * distance:g} cm"
     caption = [*described.lines(), turn]
-    pictures = pour_pictures(frames, landings, simulator.cups, distance, caption)
+    pictures = pour_pictures(frames, simulator.cups, distance, caption)
     _write(movie, pictures, len(frames.time), progress)
 
 

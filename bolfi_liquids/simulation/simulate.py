@@ -273,7 +273,7 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     if targets.out is not None:
         write_netcdf(found, targets.out)
     if targets.movie is not None:
-        film_pour(targets.movie, batch.one, simulator, action, landings, progress)
+        film_pour(targets.movie, batch.one, simulator, action, progress)
     return found
 
 

@@ -103,15 +103,15 @@ def unseen(pour, tmp_path):
 def test_a_report_says_where_its_pictures_are_simulated(unseen, monkeypatch):
     seen = []
 
-    def made(films, workers):
-        seen.append((workers, {film.scene.timeout for film in films}))
+    def made(films, compute):
+        seen.append((compute.executor, compute.timeout))
         raise TimeoutError
 
     monkeypatch.setattr(making, "_made", made)
     spawn = get_context("spawn")
     with ProcessPoolExecutor(1, spawn) as pool, pytest.raises(RuntimeError, match="60 s"):
         bl.report(unseen, executor=pool, timeout=60.0, progress=False)
-    assert seen == [(pool, {60.0})]
+    assert seen == [(pool, 60.0)]
 
 
 def test_no_result_is_opened_twice(pour, films, monkeypatch):
@@ -150,7 +150,7 @@ def test_only_films_that_are_missing_are_made_and_old_ones_go(unseen, films):
     (unseen / "moving").mkdir()
     for film in films[1:]:
         (unseen / "moving" / film.path.name).write_bytes(b"kept")
-    (unseen / "moving" / "stir-1-0123456789ab.webp").write_bytes(b"of another posterior")
+    (unseen / "moving" / "stir-0123456789ab.webp").write_bytes(b"of another posterior")
     first, *others = films_of(*results, Compute(), progress=False)
     assert first.path.read_bytes() == films[0].path.read_bytes()
     assert all(film.path.read_bytes() == b"kept" for film in others)

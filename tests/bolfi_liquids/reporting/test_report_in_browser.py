@@ -113,4 +113,4 @@ def test_films_show_all_of_the_stir_and_the_pour(films, calibration):
     assert [film.scene.name for film in films] == names
     drawn = calibration.draws(N_DRAWS_SHOWN, int(calibration.record["settings"]["seed"]))
     for film, viscosity in zip(films, 2 * drawn["viscosity"].tolist(), strict=True):
-        assert f"{viscosity:.3g} Pa s" in str(film.draw)
+        assert f"{viscosity:.3g} Pa s" in film.liquid
