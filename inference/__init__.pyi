@@ -25,9 +25,9 @@ from .result import Fit as Fit
 from .sampling.convergence import SamplingWarning as SamplingWarning
 from .simulations.bank import SimulationBank as SimulationBank
 from .surrogates.base import Acquisition as Acquisition
-from .surrogates.families import DiscrepancyFamily as DiscrepancyFamily
-from .surrogates.families import LogLikelihoodFamily as LogLikelihoodFamily
-from .surrogates.families import SignalFamily as SignalFamily
+from .surrogates.discrepancy import DiscrepancyFamily as DiscrepancyFamily
+from .surrogates.log_likelihood import LogLikelihoodFamily as LogLikelihoodFamily
 from .surrogates.noise.by_mean import relative as relative
+from .surrogates.signal import SignalFamily as SignalFamily
 from .surrogates.squared_difference import squared_difference as squared_difference
 from .surrogates.warnings import EmulatorWarning as EmulatorWarning

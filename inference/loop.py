@@ -38,8 +38,7 @@ from .simulations.job import (
 )
 from .simulations.runner import Runner
 from .sobol import start_size
-from .surrogates.base import Acquisition
-from .surrogates.families import Family
+from .surrogates.base import Acquisition, Family
 from .surrogates.warnings import complain
 from .types import Simulator, SingleSimulator, Theta
 
@@ -197,8 +196,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
                 "on from there"
             )
         made = engine.fit({"simulator": seconds}, warn=False)
-        if not budget and made.unreached:  # a table of losses, rather than of outputs
-            raise ValueError(made.unreached[0])
+        if not budget and made.learned.unreached:  # a table of losses, rather than of outputs
+            raise ValueError(made.learned.unreached[0])
         for _ in range(_confirmations(engine, budget, confirm)):
             for simulation in _confirmation(engine, made, runner, confirm):
                 seconds += simulation.seconds

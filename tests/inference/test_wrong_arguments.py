@@ -27,7 +27,7 @@ pytestmark = [
 matplotlib.use("agg")
 
 MADE_BY_THE_ENGINE = {"Emulation", "Fit", "Regression"}  # whose constructors are not for users
-CALLED_BY_THE_ENGINE = {"learner"}
+CALLED_BY_THE_ENGINE = {"learn", "measure", "observe", "search", "view"}
 OBSERVED = np.linspace(0.0, 1.0, 30)
 THETA = {"a": np.linspace(0.1, 0.9, 9)}
 CALLS = []
