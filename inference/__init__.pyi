@@ -14,13 +14,11 @@ from .checks import replicates as replicates
 from .checks import sbc as sbc
 from .checks import shared_design as shared_design
 from .checks import tarp as tarp
+from .emulation import Emulation as Emulation
+from .emulation import emulate as emulate
 from .loop import fit as fit
 from .loop import fit_losses as fit_losses
 from .prior import Prior as Prior
-from .regression import Emulation as Emulation
-from .regression import Regression as Regression
-from .regression import emulate as emulate
-from .regression import regress as regress
 from .result import Fit as Fit
 from .sampling.convergence import SamplingWarning as SamplingWarning
 from .simulations.bank import SimulationBank as SimulationBank

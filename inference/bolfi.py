@@ -20,13 +20,13 @@ from .history import (
     History,
     explain,
     init,
-    laid_out,
+    outputs_of,
     remember_asked,
     remember_told,
     told_errors,
     told_seeds,
 )
-from .notebook_display import as_html, as_text
+from .notebook_display import Displayed
 from .prior import Prior, check_support, checked_prior
 from .result import Fit
 from .sampling.confirmation import Before
@@ -45,7 +45,7 @@ MIN_LEARN = 3  # successful simulations before the surrogate may choose
 MOST_SIMULATIONS = 8192  # of one run: the processes hold matrices of as many rows and columns
 
 
-class Bolfi:
+class Bolfi(Displayed):
     """The engine between a prior and a simulator that somebody else runs.
 
     What is asked depends only on `seed` and on the calls of `ask` and `tell` before, so a run
@@ -104,12 +104,6 @@ class Bolfi:
         self._before: Before | None = None  # the posterior of which `confirm` drew
         self._seconds = 0.0
 
-    def __repr__(self) -> str:
-        return as_text("Bolfi", self._shown())
-
-    def _repr_html_(self) -> str:
-        return as_html("Bolfi", self._shown())
-
     def _shown(self) -> list[tuple[str, str]]:
         parameters = [f"{name} ~ {of['prior']}" for name, of in self.prior.describe().items()]
         told = (
@@ -146,7 +140,7 @@ class Bolfi:
     @property
     def signal_shape(self) -> tuple[int, ...]:
         """Shape of one simulated signal: that of `observed`, or of most signals told so far."""
-        return self._state.history.signals.shape[1:]
+        return self._state.history.signal_shape
 
     @property
     def expected_shape(self) -> tuple[int, ...] | None:
@@ -280,17 +274,16 @@ class Bolfi:
         given_errors = told_errors(errors, np.isfinite(measured.discrepancy))
         self._check_compared(measured)
         known = [a or b or c for a, b, c in zip(faults, measured.errors, given_errors, strict=True)]
-        kept, unlike = laid_out(told_rows, self.signal_shape)
         told = History(
             theta=natural,
             u=self.prior.to_unit(rows),
-            signals=kept,
+            outputs=outputs_of(told_rows),
             features=measured.features,
             discrepancy=measured.discrepancy,
             seeds=given_seeds,
             rounds=np.full(len(natural), UNKNOWN),
             why=explain(told_rows, measured.discrepancy, known),
-            unlike=unlike,
+            observed_shape=self.observed.shape,
         )
         self._state = remember_told(self._state, told)
         self._seconds += time.perf_counter() - started
