@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from .inputs.prior import split_parameters
 from .inputs.recording import Recording
 
 if TYPE_CHECKING:
+    from .inference.simulations import Batched
     from .inference.types import Discrepancy
     from .models import Cups, PourBatch, PourFrames, StirFrames, StirSetup
 
@@ -26,14 +27,12 @@ SAME_DENSITY = 0.02
 """Relative difference up to which two weighings are of one liquid."""
 
 
+TOGETHER = 4
+"""Simulations that one thread makes at the same time."""
+
+
 class FluidSimulator:
-    """Stops itself when its time is over, and is fastest with several simulations in a call.
-
-    Attributes:
-        together: Simulations that one thread makes at the same time.
-    """
-
-    together: ClassVar[int] = 4
+    """Simulations of the fluid, by name of their parameters."""
 
     def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """Signals (B, ...) at theta, name -> (B,)."""
@@ -44,18 +43,22 @@ class FluidSimulator:
         """A text that two equal simulators share, and no others."""
         raise NotImplementedError
 
-    def time_limit(self, seconds: float) -> AbstractContextManager[None]:
-        """Inside, a simulation that takes longer raises TimeoutError."""
-        from .models import time_limit
-
-        return time_limit(seconds)
-
     @property
-    def neutral(self) -> Mapping[str, float]:
-        """Coefficients that change nothing: runs with other effects share a call."""
+    def batched(self) -> "Batched":
+        """`simulate` as the engine calls it: it stops itself when its time is over, and runs with
+        other effects share a call."""
+        from .inference.simulations import Batched
         from .models import EFFECTS
 
-        return {name: effect.neutral for name, effect in EFFECTS.items()}
+        neutral = {name: effect.neutral for name, effect in EFFECTS.items()}
+        return Batched(self.simulate, TOGETHER, time_limit, neutral)
+
+
+def time_limit(seconds: float) -> AbstractContextManager[None]:
+    """Inside, a simulation that takes longer raises TimeoutError."""
+    from . import models
+
+    return models.time_limit(seconds)
 
 
 @dataclass(frozen=True)

@@ -20,13 +20,13 @@ from .history import (
     History,
     explain,
     init,
-    laid_out,
+    outputs_of,
     remember_asked,
     remember_told,
     told_errors,
     told_seeds,
 )
-from .notebook_display import as_html, as_text
+from .notebook_display import Displayed
 from .prior import Prior, check_support, checked_prior
 from .result import Fit
 from .sampling.confirmation import Before
@@ -34,9 +34,9 @@ from .simulations.failures import Failure, FailureKind, unusable
 from .simulations.job import BATCH
 from .simulations.returned import told_signals
 from .sobol import sobol, start_size
-from .surrogates.base import Acquisition, Measured, TrainingData
+from .surrogates.base import Acquisition, Family, Measured, TrainingData
 from .surrogates.discrepancy import is_outlier
-from .surrogates.families import Family, checked_observed, resolve
+from .surrogates.families import resolve
 from .surrogates.success import RunOutcomes
 from .surrogates.warnings import complain
 from .types import Theta
@@ -45,7 +45,7 @@ MIN_LEARN = 3  # successful simulations before the surrogate may choose
 MOST_SIMULATIONS = 8192  # of one run: the processes hold matrices of as many rows and columns
 
 
-class Bolfi:
+class Bolfi(Displayed):
     """The engine between a prior and a simulator that somebody else runs.
 
     What is asked depends only on `seed` and on the calls of `ask` and `tell` before, so a run
@@ -82,7 +82,7 @@ class Bolfi:
         checked_prior(prior)
         self.prior = prior
         self.family = resolve(surrogate, options)
-        self.observed = checked_observed(observed, self.family)
+        self.observed = self.family.observe(observed)
         self.seed = checked_integer("seed", seed, 0)
         self.initial = checked_integer(
             "initial",
@@ -90,10 +90,7 @@ class Bolfi:
             MIN_LEARN,
             MOST_SIMULATIONS,
         )
-        self._learner = self.family.learner(self.observed)
         self._acquire = resolve_acquisition(acquisition, self.family.name, self.family.acquisition)
-        # a user's own function may compare unlike shapes
-        self._any_shape = self._learner.any_shape
         self.settings: dict[str, object] = {
             "surrogate": self.family.name,
             **{name: describe(value) for name, value in vars(self.family).items()},
@@ -101,16 +98,11 @@ class Bolfi:
             "seed": self.seed,
             "initial": self.initial,
         }
-        self._state = init(len(prior), self.observed.shape, self._learner.measure([]).features)
+        features = self.family.measure(self.observed, []).features
+        self._state = init(len(prior), self.observed.shape, features)
         self._learned: Any = None  # the family's surrogate, once there is one
         self._before: Before | None = None  # the posterior of which `confirm` drew
         self._seconds = 0.0
-
-    def __repr__(self) -> str:
-        return as_text("Bolfi", self._shown())
-
-    def _repr_html_(self) -> str:
-        return as_html("Bolfi", self._shown())
 
     def _shown(self) -> list[tuple[str, str]]:
         parameters = [f"{name} ~ {of['prior']}" for name, of in self.prior.describe().items()]
@@ -148,12 +140,12 @@ class Bolfi:
     @property
     def signal_shape(self) -> tuple[int, ...]:
         """Shape of one simulated signal: that of `observed`, or of most signals told so far."""
-        return self._state.history.signals.shape[1:]
+        return self._state.history.signal_shape
 
     @property
     def expected_shape(self) -> tuple[int, ...] | None:
         """`signal_shape`; None where a user's discrepancy or summary takes signals of any shape."""
-        return None if self._any_shape else self.signal_shape
+        return None if self.family.any_shape else self.signal_shape
 
     def ask(self, n: int = 1) -> dict[str, np.ndarray]:
         """The next n different points to simulate, name -> [n].
@@ -214,18 +206,21 @@ class Bolfi:
         """theta [n, d] of the engine's choice, `designed` [m, d] being asked with them."""
         history = self._state.history
         pending = np.concatenate([self._state.pending, designed])
-        self._learned = self._learner.learn(self._training_data(), self._learned)
+        key = self._key()
+        self._learned = self.family.search(self._training_data(), key, self._learned)
         repeated = next_replicate(history, pending) if self.family.replicates else None
         parts = [] if repeated is None else [repeated[None]]
         if n > len(parts):
-            # made by NumPy: JAX would compile for half a second
-            words = np.random.SeedSequence([self.seed, self._state.asked]).generate_state(2)
-            key = jax.random.wrap_key_data(jax.device_put(words), impl="threefry2x32")
             fantasized = self._learned.fantasize(self.prior.to_unit(self.prior.to_dict(pending)))
             shape = n - len(parts), len(self.prior)
             u = chosen(self._acquire(key, fantasized, shape[0]), shape)
             parts.append(self.prior.to_array(self.prior.from_unit(u)))
         return np.concatenate(parts)
+
+    def _key(self) -> jax.Array:
+        """Made by NumPy: JAX would compile for half a second."""
+        words = np.random.SeedSequence([self.seed, self._state.asked]).generate_state(2)
+        return jax.random.wrap_key_data(jax.device_put(words), impl="threefry2x32")
 
     @property
     def _training_mask(self) -> np.ndarray:
@@ -236,7 +231,7 @@ class Bolfi:
     def _training_data(self) -> TrainingData:
         history = self._state.history
         good = self._training_mask
-        known = history.u[good], history.features[good], history.discrepancy[good]
+        known = self.observed, history.u[good], history.features[good], history.discrepancy[good]
         # runs that blew up did not succeed
         succeeded = history.succeeded & ~is_outlier(history.discrepancy)
         return TrainingData(*known, self.prior.normal, RunOutcomes(history.u, succeeded))
@@ -274,21 +269,21 @@ class Bolfi:
         told_rows, faults = self._signals(len(natural), signals)
         check_support(self.prior, rows)
         given_seeds = told_seeds(seeds, len(natural))
-        measured = _located(self._learner.measure(told_rows), rows, given_seeds)
+        measured = self.family.measure(self.observed, told_rows)
+        measured = _located(measured, rows, given_seeds)
         given_errors = told_errors(errors, np.isfinite(measured.discrepancy))
         self._check_compared(measured)
         known = [a or b or c for a, b, c in zip(faults, measured.errors, given_errors, strict=True)]
-        kept, unlike = laid_out(told_rows, self.signal_shape)
         told = History(
             theta=natural,
             u=self.prior.to_unit(rows),
-            signals=kept,
+            outputs=outputs_of(told_rows),
             features=measured.features,
             discrepancy=measured.discrepancy,
             seeds=given_seeds,
             rounds=np.full(len(natural), UNKNOWN),
             why=explain(told_rows, measured.discrepancy, known),
-            unlike=unlike,
+            observed_shape=self.observed.shape,
         )
         self._state = remember_told(self._state, told)
         self._seconds += time.perf_counter() - started
@@ -370,7 +365,7 @@ class Bolfi:
             )
         started = time.perf_counter()
         known, history = self._training_data(), self._state.history
-        fitted = in_float64(self._learner.finish)(known)
+        fitted = in_float64(self.family.learn)(known, self._key())
         self._seconds += time.perf_counter() - started
         made = Fit(
             prior=self.prior,

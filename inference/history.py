@@ -1,6 +1,6 @@
 """The value that ask and tell pass on: all that a run has asked and was told."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,17 +17,37 @@ class History(NamedTuple):
 
     theta: np.ndarray  # [n, d], natural units
     u: np.ndarray  # [n, d], prior quantiles
-    signals: np.ndarray  # [n, *signal_shape], the commonest shape; NaN where there is none
+    outputs: tuple[np.ndarray | None, ...]  # n signals of any shapes; None where there is none
     features: np.ndarray  # [n, m], what the surrogate learns of the signals besides
     discrepancy: np.ndarray  # [n], NaN where failed
     seeds: np.ndarray  # int64 [n]
     rounds: np.ndarray  # int64 [n]
     why: np.ndarray  # object [n], the Failure of a run; None where it succeeded
-    unlike: Mapping[int, np.ndarray]  # row -> its signal, if that has another shape
+    observed_shape: tuple[int, ...]
+
+    @property
+    def signal_shape(self) -> tuple[int, ...]:
+        """The commonest of a signal, or that of what was observed where there is none.
+
+        A user's discrepancy may compare unlike shapes. What is concluded must not depend on which
+        of them came first.
+        """
+        found = commonest([output.shape for output in self.outputs if output is not None])
+        return self.observed_shape if found is None else found
+
+    @property
+    def signals(self) -> np.ndarray:
+        """[n, *signal_shape], NaN where a run failed or its signal has another shape."""
+        rows = np.full((len(self.outputs), *(shape := self.signal_shape)), np.nan)
+        for row, output in enumerate(self.outputs):
+            if output is not None and output.shape == shape:
+                rows[row] = output
+        return rows
 
     def signal(self, row: int) -> np.ndarray:
-        """The signal of one run, of whatever shape."""
-        return self.unlike.get(row, self.signals[row, ...])
+        """The signal of one run, of whatever shape; NaN where it failed."""
+        output = self.outputs[row]
+        return np.full(self.signal_shape, np.nan) if output is None else output
 
     @property
     def succeeded(self) -> np.ndarray:
@@ -39,7 +59,7 @@ class History(NamedTuple):
         new."""
         distinct, seen = self.succeeded, set()
         for i in np.flatnonzero(distinct & (self.seeds != UNKNOWN)).tolist():
-            run = *self._run(i), self.signal(i).tobytes()
+            run = *self._run(i), np.asarray(self.outputs[i]).tobytes()
             distinct[i] = run not in seen
             seen.add(run)
         return distinct
@@ -75,19 +95,19 @@ class State(NamedTuple):
     rounds: int  # calls of ask
 
 
-def init(dimension: int, signal_shape: tuple[int, ...], features: np.ndarray) -> State:
+def init(dimension: int, observed_shape: tuple[int, ...], features: np.ndarray) -> State:
     """Nothing asked, nothing told: `features` [0, m]."""
     rows, none = np.zeros((0, dimension)), np.zeros(0, np.int64)
     history = History(
         theta=rows,
         u=rows,
-        signals=np.zeros((0, *signal_shape)),
+        outputs=(),
         features=features,
         discrepancy=np.zeros(0),
         seeds=none,
         rounds=none,
         why=np.zeros(0, object),
-        unlike={},
+        observed_shape=observed_shape,
     )
     return State(history, rows, none, designed=0, asked=0, rounds=0)
 
@@ -123,41 +143,17 @@ def remember_told(state: State, told: History) -> State:
 
 
 def _merged(old: History, new: History) -> History:
-    of_each = set(History._fields) - {"signals", "unlike"}
-    columns = {name: np.concatenate([getattr(old, name), getattr(new, name)]) for name in of_each}
-    if old.signals.shape[1:] == new.signals.shape[1:] and not (old.unlike or new.unlike):
-        signals, unlike = np.concatenate([old.signals, new.signals]), {}
-    else:
-        rows = [of.signal(row) for of in (old, new) for row in range(len(of.theta))]
-        signals, unlike = laid_out(rows, old.signals.shape[1:])
-    return History(**columns, signals=signals, unlike=unlike)
+    arrays = set(History._fields) - {"outputs", "observed_shape"}
+    columns = {name: np.concatenate([getattr(old, name), getattr(new, name)]) for name in arrays}
+    return old._replace(**columns, outputs=old.outputs + new.outputs)
 
 
-def laid_out(
-    signals: Sequence[np.ndarray | None], shape: tuple[int, ...]
-) -> tuple[np.ndarray, dict[int, np.ndarray]]:
-    """Signals as one array of the commonest shape, and those of others.
-
-    A user's discrepancy may compare unlike shapes. What is concluded must not depend on which of
-    them came first, so no shape is condemned here.
-
-    Args:
-        signals: n of any shapes; None, or NaN throughout, is a failed run, which has no shape.
-        shape: Of the array where every run failed.
-
-    Returns:
-        float64 [n, *shape], NaN where a run failed or its signal has another shape; and these
-        signals by row.
-    """
-    made = {
-        i: s for i, s in enumerate(signals) if s is not None and not (s.size and np.isnan(s).all())
-    }
-    found = commonest([signal.shape for signal in made.values()])
-    rows = np.full((len(signals), *(shape if found is None else found)), np.nan)
-    for i, signal in made.items():
-        if signal.shape == found:
-            rows[i] = signal
-    return rows, {i: signal for i, signal in made.items() if signal.shape != found}
+def outputs_of(signals: Sequence[np.ndarray | None]) -> tuple[np.ndarray | None, ...]:
+    """The same, None where a signal is NaN throughout, the mark of a failed run."""
+    return tuple(
+        None if signal is None or (signal.size and np.isnan(signal).all()) else signal
+        for signal in signals
+    )
 
 
 def explain(

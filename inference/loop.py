@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +30,8 @@ from .simulations.executors import Workers
 from .simulations.job import (
     BATCH,
     Job,
-    OneByOne,
+    Limit,
+    batched,
     columns,
     jobs,
     of_one_shape,
@@ -38,8 +39,7 @@ from .simulations.job import (
 )
 from .simulations.runner import Runner
 from .sobol import start_size
-from .surrogates.base import Acquisition
-from .surrogates.families import Family
+from .surrogates.base import Acquisition, Family
 from .surrogates.warnings import complain
 from .types import Simulator, SingleSimulator, Theta
 
@@ -59,6 +59,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
     bank: str | Path | SimulationBank = ":memory:",
     identity: str = "",
     timeout: float | None = None,
+    together: int = 1,
+    time_limit: Limit | None = None,
     earlier: tuple[Any, ...] | None = None,
     vectorised: bool = True,
     in_rounds: bool = True,
@@ -76,11 +78,11 @@ def fit(  # noqa: PLR0913  the one call that most users make
     goes on where it ended.
 
     Rounds of `batch` points are asked together. Without an executor a round is simulated in one
-    call; with one, every simulation is a call of its own, or up to as many as the attribute
-    `together` of the simulator says, where it has one. With in_rounds=False `batch` simulations
-    are kept in flight instead: point i is asked as soon as all up to i - batch have been told,
-    while the others still run. Which points are simulated depends on `batch` and `in_rounds`,
-    but neither on the executor nor on what finishes first.
+    call; with one, every simulation is a call of its own, or in a pool up to `together` of them
+    are. With in_rounds=False `batch` simulations are kept in flight instead: point i is asked as
+    soon as all up to i - batch have been told, while the others still run. Which points are
+    simulated depends on `batch` and `in_rounds`, but neither on the executor nor on what finishes
+    first.
 
     Args:
         simulate: Callable (theta: name -> [b], seeds: [b]) -> signals [b, *signal_shape]; or,
@@ -109,6 +111,10 @@ def fit(  # noqa: PLR0913  the one call that most users make
         timeout: Seconds that one simulation may take; those of one call together as many times
             as long, and if it fails they are tried one by one. `simulate` then runs in a
             thread, which is abandoned, not stopped, when it is overdue: see `job.within`.
+        together: Simulations that a pool's worker makes in one call of a simulator that makes
+            several faster than one by one.
+        time_limit: How `simulate` stops itself: inside `with time_limit(seconds)` it raises
+            TimeoutError once it has taken so long, and stays in its thread.
         earlier: Your own simulations (theta, signals), (theta, signals, seeds), as
             `SimulationBank.simulations` returns them, or (theta, signals, seeds, errors), as
             `Fit.history.why` has them; see `Bolfi.tell`. theta may be a data frame. They are
@@ -154,6 +160,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         check_flag(name, flag)
     if budget or simulate is not None:
         check_function("simulate", simulate)
+    simulator = batched(simulate, vectorised, together, time_limit)
     told = _length(earlier)
     if budget + told > MOST_SIMULATIONS:
         raise ValueError(
@@ -181,7 +188,6 @@ def fit(  # noqa: PLR0913  the one call that most users make
     with ExitStack() as stack:
         compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         advance = stack.enter_context(progress_bar("simulations", budget + confirm, shown=progress))
-        simulator: Any = simulate if vectorised else OneByOne(cast(SingleSimulator, simulate))
         runner = stack.enter_context(Runner(simulator, compute, identity))
         schedule = _in_rounds if in_rounds else _in_flight
         finished = schedule(engine, runner, budget, batch)
@@ -197,8 +203,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
                 "on from there"
             )
         made = engine.fit({"simulator": seconds}, warn=False)
-        if not budget and made.unreached:  # a table of losses, rather than of outputs
-            raise ValueError(made.unreached[0])
+        if not budget and made.learned.unreached:  # a table of losses, rather than of outputs
+            raise ValueError(made.learned.unreached[0])
         for _ in range(_confirmations(engine, budget, confirm)):
             for simulation in _confirmation(engine, made, runner, confirm):
                 seconds += simulation.seconds

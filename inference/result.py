@@ -13,7 +13,7 @@ from scipy.special import ndtr
 from ._float64 import in_float64
 from .arguments import check_flag, checked_integer
 from .history import History
-from .notebook_display import as_html, as_text
+from .notebook_display import Displayed
 from .prior import Prior
 from .sampling.confirmation import Before
 from .sampling.convergence import SamplingWarning
@@ -21,15 +21,12 @@ from .sampling.draw import SAMPLERS, draw_posterior
 from .sampling.importance import LEAST, Population, explore, weighted_quantiles
 from .sampling.target import Length, Target, log_likelihood
 from .surrogates.base import Surrogate, SurrogateView
-from .surrogates.signal import SignalSurrogate
 from .surrogates.warnings import (
     COLLAPSED,
     DOUBTED,
     censored_warnings,
     history_warnings,
-    range_warnings,
     unconfirmed_warnings,
-    unreached_warnings,
 )
 from .types import Theta
 
@@ -50,8 +47,8 @@ class Closest(NamedTuple):
     discrepancy: float
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit(Displayed):
     """Result of `fit` or `Bolfi.fit`; immutable.
 
     Attributes:
@@ -72,12 +69,6 @@ class Fit:
     settings: Mapping[str, object]
     seconds: Mapping[str, float]
     before: Before | None = None
-
-    def __repr__(self) -> str:
-        return as_text("Fit", self._shown())
-
-    def _repr_html_(self) -> str:
-        return as_html("Fit", self._shown())
 
     @in_float64
     def _shown(self) -> list[tuple[str, str]]:
@@ -183,7 +174,7 @@ class Fit:
         mean that it would have, were the emulator sure, to the sd that it would have then: 1 where
         the simulator is as good as known."""
         found, target = self.population, self._target
-        surely = target._replace(state=self.learned.sure)
+        surely = target._replace(log_likelihood=self.learned.sure)
         at = ndtr(found.x)
         change = log_likelihood(surely, at) - log_likelihood(target, at)
         there = np.isfinite(found.log_weights + change)
@@ -195,19 +186,7 @@ class Fit:
     def _data_warnings(self) -> list[str]:
         """Warnings about the observed output."""
         own = {self.settings.get("summary", "None"), self.settings.get("discrepancy")}
-        said = censored_warnings(self.observed, self.closest.signal) if own == {"None"} else []
-        if isinstance(self.learned, SignalSurrogate) and self.learned.known is None:
-            said += range_warnings(self.learned.scale.observed)
-        return said + self.unreached
-
-    @property
-    def unreached(self) -> list[str]:
-        """Warning that an emulated number lies beyond all simulated ones, if it does."""
-        if not isinstance(self.learned, SignalSurrogate):
-            return []
-        values = self.learned.scale.observed
-        noise = float(self.learned.scale.sds(values[None])[0, 0])
-        return unreached_warnings(values, self.history.features[self.training_mask], noise)
+        return censored_warnings(self.observed, self.closest.signal) if own == {"None"} else []
 
     @property
     def surrogate(self) -> SurrogateView:
@@ -217,7 +196,7 @@ class Fit:
     @in_float64
     def best(self) -> dict[str, float]:
         """The surrogate's best point in the prior's box; theta* of the paper."""
-        return {n: float(v) for n, v in self.prior.from_unit(self.learned.minimum()).items()}
+        return {n: float(v) for n, v in self.prior.from_unit(self.learned.best()).items()}
 
     @property
     def closest(self) -> Closest:
@@ -243,7 +222,7 @@ class Fit:
 
     @property
     def _target(self) -> Target:
-        return Target(self.learned.log_likelihood, self.learned.state, len(self.prior))
+        return Target(self.learned.log_likelihood, len(self.prior))
 
     @in_float64
     def log_prob(self, theta: Theta) -> np.ndarray:

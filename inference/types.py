@@ -8,13 +8,10 @@ import numpy as np
 Theta = Mapping[str, np.ndarray]
 """Parameter name -> values in natural units; all of shape [n], or all scalars."""
 
-LogLikelihood = Callable[[Any, Any], Any]
-"""(state, u [n, d]) -> [n], for arrays of NumPy and of JAX (see `gp.namespaces`). A module-level
-function, so that what it compiles to is cached."""
-
-LogSecondMoment = Callable[[Any, np.ndarray, np.ndarray | None], np.ndarray]
-"""(state, u [n, d], spread None or [n, ..., k]) -> [n] or [n, ...]; see
-`signal_likelihood.log_second_moment`."""
+LogLikelihood = Callable[[Any], Any]
+"""u [n, d] -> [n], for arrays of NumPy, and of JAX where NUTS is to follow it (see
+`gp.namespaces`). As a named tuple of arrays it is data: what NUTS compiles for one serves all of
+equal shapes, see `nuts.padded`."""
 
 
 class Simulator(Protocol):

@@ -47,7 +47,7 @@ def fit_recordings(
     if "initial" in options:
         options["initial"] = min(options["initial"], settings.budget)
     return inference.fit(
-        stirring.simulate,
+        stirring.batched,
         prior,
         observed,
         batch=settings.batch,
@@ -100,7 +100,7 @@ def confirmed(
     beside: dict[str, Any] = {}
     if error is not None:
         beside["noise"] = noise_beside(stirring, error)
-        observed = Experiment(stirring.simulate, observed, beside["noise"]).corrected
+        observed = Experiment(stirring.batched, observed, beside["noise"]).corrected
     made = fit_recordings(
         stirring,
         observed,

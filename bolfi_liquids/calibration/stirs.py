@@ -96,7 +96,7 @@ def stir_experiment(
 
     noise: Noise = cameras if usual is None else SumOfNoises((cameras, usual))
     return Experiment(
-        stirring.simulate, stirring.observed, noise, stirring.identity, label, windows(stirring)
+        stirring.batched, stirring.observed, noise, stirring.identity, label, windows(stirring)
     )
 
 

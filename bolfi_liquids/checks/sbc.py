@@ -148,7 +148,7 @@ class SbcStudy:
             pipeline = Calibrate(self.stirring, self.prior, calibration, self.compute.timeout)
         return inference.replicates(
             pipeline,
-            self.stirring.simulate,
+            self.stirring.batched,
             self.prior,
             self.settings.replicates[name],
             seed=self.settings.seed,
@@ -190,7 +190,7 @@ class SbcStudy:
             progress_bar("simulating stirs for all", count, shown=self.progress) as advance,
         ):
             made = run_missing(
-                stirring.simulate,
+                stirring.batched,
                 jobs(repeated, seeds),
                 replace(self.compute, batch=STIRS_PER_CALL, bank=bank),
                 identity=stirring.identity,

@@ -75,7 +75,7 @@ def pour_experiment(table: PourTable, cups: "Cups", density: float) -> "Experime
         for k, name in enumerate(OUTCOMES)
     ]
     return Experiment(
-        pours.simulate,
+        pours.batched,
         table.observed,
         PourNoise(table.angular_velocity, table.distance),
         pours.identity,

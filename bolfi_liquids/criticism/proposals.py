@@ -59,7 +59,7 @@ def stir_proposals(
         plan = planned_recording(path.time, path.position, recording.attrs)
         own = StirSimulator((plan,), (setup,))
         shape = (len(path.time), 2)
-        made.append(Proposal(own.simulate, all_noise, shape, own.identity, label))
+        made.append(Proposal(own.batched, all_noise, shape, own.identity, label))
     return made
 
 
@@ -78,7 +78,7 @@ def pour_proposals(cups: "Cups", density: float, tried: int = 2) -> list["Propos
         )
         made.append(
             Proposal(
-                pours.simulate,
+                pours.batched,
                 PourNoise(actions.angular_velocity, actions.distance),
                 (len(OUTCOMES), len(distance)),
                 pours.identity,

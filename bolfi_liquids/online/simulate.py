@@ -28,4 +28,4 @@ def simulate_plan(
 
     with SimulationBank(bank) as kept:
         compute = Compute(bank=kept, batch=batch)
-        return run_missing(stirring.simulate, jobs, compute, identity=stirring.identity)
+        return run_missing(stirring.batched, jobs, compute, identity=stirring.identity)

@@ -56,7 +56,7 @@ def simulate_kept(
     """
     asked = jobs(theta, seeds)
     results = run_missing(
-        simulator.simulate, asked, compute, identity=simulator.identity, advance=advance
+        simulator.batched, asked, compute, identity=simulator.identity, advance=advance
     )
     good = succeeded(results)
     failed = {

@@ -164,7 +164,7 @@ def simulated(
     from ..inference.simulations import Job, run_missing
 
     jobs = [Job(theta_of(one), one.seed) for one in batch.liquids]
-    made = run_missing(Raising(simulator).simulate, jobs, compute)
+    made = run_missing(Raising(simulator).batched, jobs, compute)
     for job, one in zip(jobs, made, strict=True):
         if one.signal is None:
             raise RuntimeError(f"the simulation of {job.theta} failed: {one.error}")

@@ -16,9 +16,8 @@ from scipy.special import ndtr, ndtri
 from ..arguments import checked_number
 from ..gp.namespaces import log_sum_exp
 from ..gp.optimise import minimise_in_box
-from ..gp.process import predict, predict_joint
 from ..surrogates.base import Surrogate
-from ..surrogates.success import log_success
+from ..surrogates.discrepancy import DiscrepancySurrogate
 from .screen import ROUNDS, screen
 
 CANDIDATES = 128  # points among which a rule chooses
@@ -36,17 +35,6 @@ def exploration_width(t: int, dimension: int, epsilon: float = 0.1) -> float:
         epsilon: eps_eta, 0.1 in the paper.
     """
     return float(np.sqrt(2.0 * np.log(t ** (dimension / 2 + 2) * np.pi**2 / (3.0 * epsilon))))
-
-
-def lower_confidence_bound(surrogate: Surrogate, u: np.ndarray) -> np.ndarray:
-    """mu - eta_t sqrt(v) at u [n, d], v the variance of the latent mean (without noise).
-
-    In standard deviations of the targets, less the log chance that a run at u succeeds.
-    """
-    data = surrogate.gp.data
-    mean, variance = predict(surrogate.gp, u)
-    bound = mean - exploration_width(*data.u.shape) * np.sqrt(variance)
-    return np.mean(bound, axis=0) - log_success(surrogate.success, u)
 
 
 @dataclass(frozen=True)
@@ -67,12 +55,13 @@ class LowerConfidenceBound:
     def __post_init__(self) -> None:
         checked_number("jitter", self.jitter, lambda sd: 0.0 < sd < np.inf, "positive")
 
-    def __call__(self, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
+    def __call__(self, key: jax.Array, surrogate: DiscrepancySurrogate, n: int) -> np.ndarray:
         """n points u [n, d]; each is fantasized before the next is chosen."""
         rng, points = generator(key), []
         while len(points) < n:
-            bound = partial(lower_confidence_bound, surrogate)
-            centre = minimise_in_box(bound, surrogate.gp.data.u.shape[1])
+            width = exploration_width(*surrogate.u.shape)
+            bound = partial(surrogate.lower_bound, width=width)
+            centre = minimise_in_box(bound, surrogate.u.shape[1])
             points.append(truncated_normal(rng, centre, self.jitter))
             if len(points) < n:
                 surrogate = surrogate.fantasize(points[-1][None])
@@ -104,10 +93,9 @@ def candidates(rng: np.random.Generator, surrogate: Surrogate) -> Candidates:
 
     The power is halved until at least MIN_EFFECTIVE points count, however narrow the posterior.
     """
-    dimension = surrogate.gp.data.u.shape[1]
+    dimension, log_likelihood = surrogate.u.shape[1], surrogate.log_likelihood
     shifts = rng.uniform(size=(ROUNDS, dimension + 1))
-    log_likelihood, state = surrogate.log_likelihood, surrogate.state
-    found = screen(shifts, lambda u: 0.5 * np.asarray(log_likelihood(state, u)))
+    found = screen(shifts, lambda u: 0.5 * np.asarray(log_likelihood(u)))
     log_target, log_weights = found.log_target, found.log_weights
     log_base = log_weights - np.where(np.isfinite(log_target), log_target, 0.0)
     power, weights = 1.0, _normalised(log_weights)
@@ -117,7 +105,7 @@ def candidates(rng: np.random.Generator, surrogate: Surrogate) -> Candidates:
     positions = (np.arange(CANDIDATES) + rng.uniform()) / CANDIDATES
     rows = np.minimum(np.searchsorted(np.cumsum(weights), positions), len(weights) - 1)
     u = found.u[rows]
-    return Candidates(u, power * log_target[rows], log_success(surrogate.success, u))
+    return Candidates(u, power * log_target[rows], surrogate.log_success(u))
 
 
 def _normalised(log_weights: np.ndarray) -> np.ndarray:
@@ -127,8 +115,7 @@ def _normalised(log_weights: np.ndarray) -> np.ndarray:
 
 def log_moments(surrogate: Surrogate, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """log E[L] and log Var[L] at u [n, d], L being known only through the surrogate."""
-    first = surrogate.log_likelihood(surrogate.state, u)
-    second = surrogate.log_second_moment(surrogate.state, u, None)
+    first, second = surrogate.log_likelihood(u), surrogate.log_second_moment(u)
     excess = np.maximum(second - 2.0 * first, 1e-12)
     return first, 2.0 * first + excess + np.log(-np.expm1(-excess))
 
@@ -202,14 +189,6 @@ class PosteriorDraws:
         return log_likelihood - found.log_density + rng.gumbel(size=len(found.u))
 
 
-def _log_resolved(surrogate: Surrogate, u: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """log E[E[L(node) | a run at u]^2], [m, n] for nodes [m, d] and u [n, d]."""
-    gp = surrogate.gp
-    at_u = predict(gp, u)[1] + np.exp(2.0 * gp.hyper.log_noise)[:, None]
-    spread = predict_joint(gp, nodes, u) ** 2 / at_u[:, None, :]  # [k, m, n]
-    return surrogate.log_second_moment(surrogate.state, nodes, np.moveaxis(spread, 0, -1))
-
-
 @dataclass(frozen=True)
 class ExpectedIntegratedVariance:
     """Minimise Var[L] as it is expected after the run, integrated over the box.
@@ -225,7 +204,7 @@ class ExpectedIntegratedVariance:
     @staticmethod
     def _score(rng: np.random.Generator, surrogate: Surrogate, found: Candidates) -> np.ndarray:
         rows = rng.permutation(len(found.u))[:INTEGRATION_NODES]
-        resolved = _log_resolved(surrogate, found.u, found.u[rows])
+        resolved = surrogate.log_second_moment(found.u[rows], found.u)
         return log_sum_exp((resolved - found.log_density[rows, None]).T)
 
 
@@ -246,7 +225,7 @@ class CautiousDraws:
     def __call__(self, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
         """n different points u [n, d]."""
         first = n - int(n * self.share + generator(key).uniform())
-        points = np.zeros((0, surrogate.gp.data.u.shape[1]))
+        points = np.zeros((0, surrogate.u.shape[1]))
         if first:
             points = PosteriorDraws()(key, surrogate.cautious, first)
         if first == n:

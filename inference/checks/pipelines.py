@@ -5,7 +5,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from inspect import signature
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from ..result import Fit
 from ..simulations.bank import SimulationBank
 from ..simulations.compute import open_compute
 from ..simulations.executors import Workers
-from ..simulations.job import BATCH, OneByOne, jobs, simulation_seed, stacked
+from ..simulations.job import BATCH, batched, jobs, simulation_seed, stacked
 from ..simulations.runner import run_missing
 from ..sobol import sobol
 from ..surrogates.families import resolve
@@ -35,6 +35,7 @@ from .one_replicate import LogDensity
 
 Options = Mapping[str, Any]
 
+CALLING = "vectorised", "together", "time_limit"  # options of `fit` about its simulator
 OF_PIPELINE = {"simulate", "prior", "observed", "budget", "seed"}  # what a pipeline gives itself
 
 
@@ -59,12 +60,11 @@ def _check_names(which: str, given: Options, known: set[str]) -> None:
 def _batched(
     simulate: Simulator | SingleSimulator, options: Options
 ) -> tuple[Simulator, dict[str, Any]]:
-    """A simulator of batches, and the options without `vectorised`, which says what was given."""
+    """A simulator of batches, and the options without those that say how it is called."""
     others = checked_mapping("options", options, "values")
     check_flag("options['vectorised']", others.get("vectorised", True))
-    if others.pop("vectorised", True):
-        return cast(Simulator, simulate), others
-    return OneByOne(cast(SingleSimulator, simulate)), others
+    called = {name: others.pop(name) for name in CALLING if name in others}
+    return batched(simulate, **called), others
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,8 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
         n: Simulations, at least three.
         batch: Simulations in one call, and stored together, where there is no executor.
         seed: Fixes the points and the simulations' seeds.
-        options: Of `Bolfi`, such as {"surrogate": "signal"}; and "vectorised", see `fit`.
+        options: Of `Bolfi`, such as {"surrogate": "signal"}; and "vectorised", "together" and
+            "time_limit", see `fit`.
         sampling: Of `Fit.sample`, such as {"chains": 2, "draws": 250}.
         warn: Whether a replicate's complaints are raised as warnings.
 
@@ -186,14 +187,15 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
     checked_prior(prior)
     check_text("identity", identity)
     check_flag("warn", warn)
-    batched, options = _batched(simulate, options or {})
+    simulator, options = _batched(simulate, options or {})
     _check_options(Bolfi, options, sampling or {})
     theta = prior.from_unit(sobol(seed, 0, n, len(prior)))
     seeds = [simulation_seed(seed, i) for i in range(n)]
     with ExitStack() as stack:
         compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         advance = stack.enter_context(progress_bar("simulations", n, shown=progress))
-        made = run_missing(batched, jobs(theta, seeds), compute, identity=identity, advance=advance)
+        asked = jobs(theta, seeds)
+        made = run_missing(simulator, asked, compute, identity=identity, advance=advance)
     good = sum(result.signal is not None for result in made)
     if good < MIN_LEARN:
         first = next((result.error for result in made if result.error), "none")
@@ -201,4 +203,4 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
             f"{good} of {n} simulations succeeded, {MIN_LEARN} are needed; the first error: {first}"
         )
     design = prior.to_array(theta), stacked(made), np.array(seeds)
-    return SharedDesign(batched, prior, *design, options, sampling or {}, warn)
+    return SharedDesign(simulator, prior, *design, options, sampling or {}, warn)

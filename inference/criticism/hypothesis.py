@@ -13,11 +13,10 @@ from ..gp.optimise import minimise_in_box
 from ..prior import Prior
 from ..result import Fit
 from ..surrogates.emulator import latent_covariance, predict
-from ..surrogates.families import SignalFamily
 from ..surrogates.measurement_noise import Layout, Nodes, Reduced
 from ..surrogates.output_vectors import Output
-from ..surrogates.signal import SignalSurrogate
-from ..surrogates.signal_likelihood import SignalState, eliminate, scores
+from ..surrogates.signal import SignalFamily, SignalSurrogate
+from ..surrogates.signal_likelihood import SignalLikelihood, eliminate, scores
 from .measurement_noise import Noise, samples
 from .prior_boxes import LATER_HALF_WIDTH, PriorBox, around, intersection
 from .run_noise import own_errors, resized, smooth_covariance
@@ -196,8 +195,8 @@ def _nearest(
     assert surrogate.known is not None
     own = smooth_covariance(errors, surrogate.output.layout, surrogate.output.long)
     reduced = _reduced(surrogate, [own + surrogate.known.covariance])
-    state = replace(surrogate, reduced=reduced).state
-    return minimise_in_box(partial(_squared_distance, state), len(within.low), *within), own
+    likelihood = replace(surrogate, reduced=reduced).log_likelihood
+    return minimise_in_box(partial(_squared_distance, likelihood), len(within.low), *within), own
 
 
 def _sized(
@@ -237,7 +236,7 @@ def _reduced(surrogate: SignalSurrogate, covariances: Sequence[np.ndarray]) -> R
     return Reduced(estimate, error, log_weight - log_weight.max(), unexplained, np.ones(g))
 
 
-def _squared_distance(state: SignalState, u: np.ndarray) -> np.ndarray:
+def _squared_distance(state: SignalLikelihood, u: np.ndarray) -> np.ndarray:
     """At u [n, d]: half the squared distance of expected from observed scores, by the noise alone.
 
     Not the likelihood, in which the emulator's variance counts as noise: where a model cannot

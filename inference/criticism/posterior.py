@@ -46,7 +46,7 @@ class Weighted(NamedTuple):
 def weighted_posterior(hypothesis: Hypothesis, seed: int = 0) -> Weighted:
     """Adaptive importance sampling of a hypothesis's posterior, see `importance.explore`."""
     surrogate, prior = hypothesis.surrogate, hypothesis.fit.prior
-    target = Target(surrogate.log_likelihood, surrogate.state, len(prior))
+    target = Target(surrogate.log_likelihood, len(prior))
     found = explore(np.random.default_rng(seed), target)
     used = np.isfinite(found.log_weights)
     weights = np.exp(found.log_weights[used] - found.log_weights[used].max())

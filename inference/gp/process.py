@@ -198,6 +198,12 @@ def predict_joint(gp: GP, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     return covariance(gp.hyper, at, there) - at_u @ at_v.mT
 
 
+def resolved(gp: GP, u: np.ndarray, runs: np.ndarray) -> np.ndarray:
+    """Part of the variances at u [n, d] that a run at each of `runs` [m, d] resolves: [n, m, k]."""
+    at_run = predict(gp, runs)[1] + np.exp(2.0 * gp.hyper.log_noise)[:, None]
+    return np.moveaxis(predict_joint(gp, u, runs) ** 2 / at_run[:, None, :], 0, -1)
+
+
 def leave_one_out(gp: GP) -> tuple[np.ndarray, np.ndarray]:
     """Mean and variance [k, n] of each y given all others (Rasmussen and Williams, eq. 5.12).
 

@@ -72,5 +72,5 @@ class Before(NamedTuple):
         missed = np.where(missed > ROUNDING * np.abs(mean), missed, 0.0)
         # what has been constant so far is predicted for sure
         errors = np.divide(missed, sd, out=np.where(missed > 0.0, np.inf, 0.0), where=sd > 0.0)
-        known = len(self.learned.gp.data.u)
+        known = len(self.learned.u)
         return bool(np.mean(errors**2) > stats.f.isf(SURPRISE_ALPHA, len(runs), known))

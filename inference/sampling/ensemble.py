@@ -64,7 +64,7 @@ def _sampler(
     d = target.dimension
 
     def log_prob(x: np.ndarray) -> np.ndarray:
-        values = np.asarray(log_density(target.log_likelihood, target.state, x))
+        values = np.asarray(log_density(target.log_likelihood, x))
         return np.where(np.isfinite(values), values, LOG_ZERO)
 
     def jump(x: np.ndarray, random: Any) -> tuple[np.ndarray, np.ndarray]:

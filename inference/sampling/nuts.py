@@ -11,7 +11,8 @@ from numpyro.infer.hmc import HMCState, hmc
 from numpyro.infer.util import ParamInfo
 from scipy.special import ndtr, ndtri
 
-from ..gp.process import GP, padded
+from ..gp.process import GP
+from ..gp.process import padded as padded_process
 from ..types import LogLikelihood
 from .compilation_cache import kept_compilations
 from .importance import Population, explore, resampled
@@ -54,14 +55,14 @@ class Jumps(NamedTuple):
 
 
 # compiled within: it is traced and lowered once, though a step and a jump evaluate it
-_log_density = jax.jit(log_density, static_argnums=0)
+_log_density = jax.jit(log_density)
 
 
 def _sampler() -> tuple[Any, Any]:
     """numpyro's functional interface: its MCMC objects hold model and data in their cache."""
 
-    def potential(log_likelihood: LogLikelihood, state: Any, factor: jax.Array) -> Any:
-        return lambda y: -_log_density(log_likelihood, state, (factor @ y)[None])[0]
+    def potential(likelihood: LogLikelihood, factor: jax.Array) -> Any:
+        return lambda y: -_log_density(likelihood, (factor @ y)[None])[0]
 
     return potential, hmc(potential_fn_gen=potential, algo="NUTS")
 
@@ -75,7 +76,7 @@ def _settings(y: jax.Array, seed: jax.Array, warmup: int) -> dict[str, Any]:
         "step_size": FIRST_STEP,
         "adapt_mass_matrix": False,
         "target_accept_prob": TARGET_ACCEPTANCE,
-        "model_args": (None, None, None),
+        "model_args": (None, None),
         "rng_key": jax.random.key(seed, impl="threefry2x32"),
     }
 
@@ -87,15 +88,15 @@ def _begin(y: jax.Array, seed: jax.Array, *, warmup: int) -> HMCState:
 
 
 def _run(
-    last: HMCState, state: Any, guide: Guide, jumps: Jumps, *, log_likelihood: Any, warmup: int
+    last: HMCState, likelihood: LogLikelihood, guide: Guide, jumps: Jumps, *, warmup: int
 ) -> tuple[HMCState, Any]:
     """One more draw for each jump: the last state, prior quantiles [n, d] and statistics [n].
 
-    Likelihood state and guide are arguments, so that another fit reuses the compiled program.
+    Likelihood and guide are arguments, so that another fit reuses the compiled program.
     Chains call it one by one: batched by `vmap` it takes twice as long to compile.
     """
     potential, (kernel, step) = _sampler()
-    arguments = log_likelihood, state, guide.factor
+    arguments = likelihood, guide.factor
     # numpyro's step knows its settings from the kernel that began; this one is not run
     kernel(**_settings(last.z, jnp.zeros((), jnp.uint32), warmup))
 
@@ -116,7 +117,7 @@ def _compiled_run() -> Any:
         jax.jit(lambda x: x + 1, compiler_options=options)(0)
     except jax.errors.JaxRuntimeError:  # an XLA that knows no such option
         options = None
-    return jax.jit(_run, static_argnames=("log_likelihood", "warmup"), compiler_options=options)
+    return jax.jit(_run, static_argnames="warmup", compiler_options=options)
 
 
 def _jumped(jump: Jumps, now: HMCState, potential: Any, guide: Guide) -> HMCState:
@@ -166,7 +167,6 @@ def _blocks(
 ) -> Iterator[Chains]:
     """Blocks of draws from x [chain, d], the warm-up's among them, without end."""
     whitener = np.linalg.inv(guide.factor)
-    fixed = {"log_likelihood": target.log_likelihood, "warmup": warmup}
 
     def jumps(first: np.ndarray | None) -> Jumps:
         x = propose(guide.mixture, rng.normal(size=(BLOCK, d)), 1.0 - rng.random((BLOCK, UNIFORMS)))
@@ -177,13 +177,13 @@ def _blocks(
 
     d = start.shape[1]
     seeds = rng.integers(2**31, size=len(start)).astype(np.uint32)
-    state = padded_state(target.state)
+    run, likelihood = _compiled_run(), padded(target.log_likelihood)
     y = start @ whitener.T
 
     def block(starts: Sequence[np.ndarray | None]) -> Chains:
         made = []
         for i, first in enumerate(starts):
-            last[i], drawn = _compiled_run()(last[i], state, guide, jumps(first), **fixed)
+            last[i], drawn = run(last[i], likelihood, guide, jumps(first), warmup=warmup)
             made.append(jax.tree.map(np.asarray, drawn))
         x, stats = jax.tree.map(lambda *chains: np.stack(chains), *made)
         return Chains(ndtr(x), stats)
@@ -196,15 +196,21 @@ def _blocks(
         yield block([None] * len(start))
 
 
-def padded_state(state: Any) -> Any:
+def padded(likelihood: Any) -> Any:
     """The same likelihood in arrays of few shapes, so that another number of simulations reuses the
-    compiled program: its processes are padded, and what its own method `padded` pads."""
+    compiled program: its processes are padded, and what its own method `padded` pads. What is no
+    named tuple of arrays is compiled anew for each fit."""
 
     def process(part: object) -> bool:
         return isinstance(part, GP)
 
-    state = state.padded() if hasattr(state, "padded") else state
-    return jax.tree.map(lambda one: padded(one) if process(one) else one, state, is_leaf=process)
+    def pad(part: Any) -> Any:
+        return padded_process(part) if process(part) else part
+
+    if not isinstance(likelihood, tuple | jax.tree_util.Partial):
+        return jax.tree_util.Partial(likelihood)
+    own = getattr(likelihood, "padded", lambda: likelihood)
+    return jax.tree.map(pad, own(), is_leaf=process)
 
 
 def _take(blocks: Iterator[Chains], count: int, left: list[Chains]) -> Chains:

@@ -21,7 +21,6 @@ class Target(NamedTuple):
     """A log likelihood over prior quantiles u [dimension]."""
 
     log_likelihood: LogLikelihood
-    state: Any
     dimension: int
 
 
@@ -40,13 +39,13 @@ class Chains(NamedTuple):
     stats: dict[str, np.ndarray]  # name -> [chain, draw]
 
 
-def log_density(log_likelihood: LogLikelihood, state: Any, x: Any) -> Any:
+def log_density(log_likelihood: LogLikelihood, x: Any) -> Any:
     """Log posterior density [n] at x [n, d], u = Phi(x), for arrays of NumPy or JAX.
 
     The prior is uniform in u, so the Jacobian is a standard normal density: directions that
     the data leave open become standard normal, the easiest shape for a sampler.
     """
-    return log_likelihood(state, ndtr(x)) + log_prior(x)
+    return log_likelihood(ndtr(x)) + log_prior(x)
 
 
 def log_likelihood(target: Target, u: np.ndarray) -> np.ndarray:
@@ -54,5 +53,5 @@ def log_likelihood(target: Target, u: np.ndarray) -> np.ndarray:
     values = np.empty(len(u))
     for start in range(0, len(u), BATCH):
         rows = slice(start, start + BATCH)
-        values[rows] = target.log_likelihood(target.state, u[rows])
+        values[rows] = target.log_likelihood(u[rows])
     return values

@@ -8,13 +8,13 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
-from ..arguments import Unusable, checked_integer, checked_mapping, float64
+from ..arguments import Unusable, check_callable, checked_integer, checked_mapping, float64
 from ..types import Simulator, SingleSimulator
 from .bank import Simulation
 from .failures import Failure, FailureKind, raised, timed_out, unusable
@@ -70,19 +70,51 @@ def columns(
 
 
 @dataclass(frozen=True)
+class Batched:
+    """A simulator of batches, and how it is best called.
+
+    Attributes:
+        simulate: Callable (theta: name -> [b], seeds: [b]) -> signals [b, *signal_shape].
+        together: Simulations that one call on a pool may make. Of 1 each is stored when it is
+            finished, and a worker that is done takes the next.
+        time_limit: How it stops itself, so that it stays in its thread; None if it does not.
+        neutral: Parameter -> the value at which it changes nothing: runs that name others of these
+            share a call.
+
+    Raises:
+        ValueError: `together` is no number of simulations, `time_limit` no function, or `neutral`
+            maps no names.
+    """
+
+    simulate: Simulator
+    together: int = field(default=1, compare=False)
+    time_limit: Limit | None = field(default=None, compare=False)
+    neutral: Mapping[str, float] = field(default_factory=dict, compare=False)
+
+    def __post_init__(self) -> None:
+        checked_integer("together", self.together)
+        check_callable("time_limit", self.time_limit)
+        checked_mapping("neutral", self.neutral, "numbers")
+
+    def __call__(self, theta: dict[str, np.ndarray], seeds: np.ndarray) -> np.ndarray:
+        """theta: name -> [n]; seeds: int64 [n]  ->  signals [n, *signal_shape]."""
+        return self.simulate(theta, seeds)
+
+
+@dataclass(frozen=True)
 class OneByOne:
     """A simulator of single runs as one of batches, which is what the engine calls.
 
     Attributes:
         simulate: Callable (theta: name -> float, seed) -> signal [*signal_shape].
+        time_limit: See `Batched`.
     """
 
     simulate: SingleSimulator
+    time_limit: Limit | None = field(default=None, compare=False)
 
-    @property
-    def time_limit(self) -> Limit | None:
-        """How the simulator of single runs stops itself; see `limit_of`."""
-        return limit_of(self.simulate)
+    def __post_init__(self) -> None:
+        check_callable("time_limit", self.time_limit)
 
     def __call__(self, theta: Mapping[str, np.ndarray], seeds: np.ndarray) -> np.ndarray:
         """theta: name -> [n]; seeds: int64 [n]  ->  signals [n, *signal_shape].
@@ -93,6 +125,20 @@ class OneByOne:
             Unusable: it returned something else than numbers.
         """
         return np.stack([float64(self.simulate(*job)) for job in jobs(theta, seeds)])
+
+
+def batched(
+    simulate: Simulator | SingleSimulator,
+    vectorised: bool = True,
+    together: int = 1,
+    time_limit: Limit | None = None,
+) -> Batched | OneByOne:
+    """What a user gives as one that the engine calls; what is one already stays."""
+    if isinstance(simulate, Batched | OneByOne):
+        return simulate
+    if vectorised:
+        return Batched(cast(Simulator, simulate), together, time_limit)
+    return OneByOne(cast(SingleSimulator, simulate), time_limit)
 
 
 def is_unusable(result: Simulation) -> bool:
@@ -158,7 +204,7 @@ def run_batch(
     timeout: float | None = None,
 ) -> list[Simulation]:
     """Simulate all jobs in one call; in several where they name other parameters than those of
-    which the simulator's `neutral` has the values that change nothing.
+    which `Batched.neutral` has the values that change nothing.
 
     An exception, taking too long, or returning other than one signal per job costs only the run
     to blame: the batch is then repeated one by one. Seconds are shared out evenly.
@@ -167,7 +213,7 @@ def run_batch(
         shape: Of one signal; None accepts any.
         timeout: Seconds per job that the call may take, see `within`.
     """
-    neutral = neutral_of(simulate)
+    neutral = simulate.neutral if isinstance(simulate, Batched) else {}
     named = [frozenset(job.theta.keys() - neutral.keys()) for job in batch]
     if len(set(named)) > 1:
         found: dict[int, Simulation] = {}
@@ -224,38 +270,9 @@ def misshapen(
     )
 
 
-def limit_of(simulate: Simulator | SingleSimulator) -> Limit | None:
-    """How a simulator stops itself: the method `time_limit` of it, or of the object whose method
-    it is; None if there is no such method."""
-    return _told_by(simulate, "time_limit", None)
-
-
-def most_together(simulate: Simulator | SingleSimulator) -> int:
-    """Simulations that one call on an executor may make: the attribute `together` of a simulator,
-    or of the object whose method it is; 1 without it, for then each is stored when it is finished,
-    and a worker that is done takes the next.
-
-    Raises:
-        ValueError: `together` is not a whole number from 1 on.
-    """
-    return checked_integer("the simulator's `together`", _told_by(simulate, "together", 1))
-
-
-def neutral_of(simulate: Simulator | SingleSimulator) -> Mapping[str, float]:
-    """Values at which parameters change nothing: the attribute `neutral` of a simulator, or of the
-    object whose method it is; none without it.
-
-    Raises:
-        ValueError: `neutral` does not map names to numbers.
-    """
-    return checked_mapping(
-        "the simulator's `neutral`", _told_by(simulate, "neutral", {}), "numbers"
-    )
-
-
-def _told_by(simulate: Simulator | SingleSimulator, name: str, default: Any) -> Any:
-    """An attribute of a simulator, or of the object whose method it is."""
-    return getattr(getattr(simulate, "__self__", simulate), name, default)
+def limit_of(simulate: object) -> Limit | None:
+    """How a simulator stops itself; None if it does not."""
+    return simulate.time_limit if isinstance(simulate, Batched | OneByOne) else None
 
 
 def within[R](timeout: float | None, call: Callable[[], R], limit: Limit | None = None) -> R:

@@ -14,11 +14,10 @@ from .executors import killed_its_worker, workers_of
 from .failures import FailureKind, NoSignals, raised, unusable
 from .job import (
     BATCH,
+    Batched,
     Job,
     OneByOne,
     is_unusable,
-    most_together,
-    neutral_of,
     of_one_shape,
     run_batch,
 )
@@ -52,13 +51,9 @@ class Runner:
         simulate: The user's simulator.
         compute: Where simulations are made and kept; the caller decides on batches.
         identity: The simulator's name in the bank.
-
-    Raises:
-        ValueError: the simulator's `neutral` maps no names.
     """
 
     def __init__(self, simulate: Simulator, compute: Compute, identity: str = ""):
-        neutral_of(simulate)  # refused now, not by a worker
         self.simulate = simulate
         self._misshapen_until = BATCH  # results, whatever the batch; 0 once another came
         self._misshapen = 0
@@ -103,9 +98,6 @@ class Runner:
         Returns:
             An outcome per job, for `result`. With an executor those of a call are stored the
             moment it is finished, in whatever order.
-
-        Raises:
-            ValueError: the simulator's `together` is no number of simulations.
         """
         orders = [Order(job, shape, Future()) for job in batch]
         self._elsewhere += orders
@@ -181,7 +173,8 @@ class Runner:
         """What goes to the executor in one call: as much as the simulator likes, even if a worker
         then idles: half a call takes nearly as long. One by one where a worker may die alone: a
         call with it."""
-        each = 1 if workers_of(executor) is None else most_together(self.simulate)
+        pool = workers_of(executor) is not None
+        each = self.simulate.together if pool and isinstance(self.simulate, Batched) else 1
         return (orders[start : start + each] for start in range(0, len(orders), each))
 
     def _submit(self, executor: Executor, orders: list[Order]) -> None:

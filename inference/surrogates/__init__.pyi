@@ -1,8 +1,11 @@
 from .base import Acquisition as Acquisition
+from .base import Family as Family
+from .base import Measured as Measured
 from .base import Surrogate as Surrogate
-from .families import DiscrepancyFamily as DiscrepancyFamily
-from .families import LogLikelihoodFamily as LogLikelihoodFamily
-from .families import SignalFamily as SignalFamily
+from .base import TrainingData as TrainingData
+from .discrepancy import DiscrepancyFamily as DiscrepancyFamily
+from .log_likelihood import LogLikelihoodFamily as LogLikelihoodFamily
+from .signal import SignalFamily as SignalFamily
 from .squared_difference import squared_difference as squared_difference
 from .threshold import Matched as Matched
 from .threshold import Predicted as Predicted

@@ -1,22 +1,29 @@
-"""Protocols of what the engine learns and how it chooses; families and users satisfy them."""
+"""Protocols of what the engine learns and how it chooses; families and users satisfy them.
 
-from typing import Any, NamedTuple, Protocol
+A member with a body need not be written: a class that names the protocol as its base inherits it.
+"""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import jax
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .._float64 import in_float64
-from ..gp.process import GP
+from ..arguments import checked_array
 from ..prior import Prior
 from ..simulations.failures import Failure
-from ..types import LogLikelihood, LogSecondMoment, Theta
+from ..types import LogLikelihood, Theta
+from .squared_difference import evaluate, sum_of_squares
 from .success import RunOutcomes
 
 
 class TrainingData(NamedTuple):
     """Successful simulations, as a family measured them."""
 
-    u: np.ndarray  # [n, d]
+    observed: np.ndarray  # [*signal_shape]
+    u: np.ndarray  # [n, d], prior quantiles
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n]
     normal: np.ndarray | None  # bool [d], see `Prior.normal`
@@ -34,71 +41,19 @@ class Measured(NamedTuple):
 class Surrogate(Protocol):
     """A likelihood learned from simulations, over prior quantiles u in [0, 1]^d."""
 
-    @property
-    def gp(self) -> GP:
-        """The processes on which it rests."""
-        ...
+    u: np.ndarray  # [n, d], where it was learned, fantasized points included
+    log_likelihood: LogLikelihood
 
-    @property
-    def state(self) -> Any:
-        """NamedTuple of NumPy arrays on which the likelihood depends, `gp` among them; data, never
-        a closure. NUTS is compiled for each set of shapes, see `nuts.padded_state`."""
-        ...
-
-    @property
-    def success(self) -> GP | None:
-        """Where runs succeed, see `success.log_success`; None is everywhere."""
-        ...
-
-    @property
-    def cautious(self) -> "Surrogate":
-        """The surrogate to which its own doubt beyond what the data can resolve is no
-        agreement."""
-        ...
-
-    @property
-    def sure(self) -> Any:
-        """The state, were what is emulated known."""
-        ...
-
-    @property
-    def log_likelihood(self) -> LogLikelihood: ...
-
-    @property
-    def log_second_moment(self) -> LogSecondMoment: ...
-
-    def minimum(self) -> np.ndarray:
-        """The u [d] that fits best."""
+    def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd of a new simulation at u [n, d], each [n, ...]."""
         ...
 
     def fantasize(self, u: np.ndarray) -> "Surrogate":
         """The surrogate after its own predictions at u [n, d] came true (pending points)."""
         ...
 
-    def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd of a new simulation at u [n, d], each [n, ...]."""
-        ...
-
-    def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
-        """The quantity of `predict`, for n finished runs [n, ...]."""
-        ...
-
-    def constants(self) -> dict[str, np.ndarray]:
-        """Constants of the likelihood, kept with the posterior."""
-        ...
-
-    def described(self) -> list[str]:
-        """The most important constants, in a few words."""
-        ...
-
-    def checks(self) -> dict[str, np.ndarray]:
-        """Of the emulator: `loo_z`, studentised leave-one-out errors [n, ...], a row for each
-        simulation that was learned from."""
-        ...
-
-    @property
-    def fits(self) -> bool:
-        """Whether what was observed is explained."""
+    def best(self) -> np.ndarray:
+        """The u [d] that fits best."""
         ...
 
     def warnings(self, *, confirmed: bool = False) -> list[str]:
@@ -108,11 +63,115 @@ class Surrogate(Protocol):
             confirmed: Runs at draws of the posterior left it where it was: then errors of the
                 emulator, which may lie far from it, are not complained of.
         """
-        ...
+        return []
+
+    @property
+    def unreached(self) -> list[str]:
+        """Sentences that say why nothing can be concluded from a table without a simulator."""
+        return []
+
+    @property
+    def fits(self) -> bool:
+        """Whether what was observed is explained."""
+        return True
+
+    @property
+    def cautious(self) -> "Surrogate":
+        """The surrogate to which its own doubt beyond what the data can resolve is no
+        agreement."""
+        return self
+
+    @property
+    def sure(self) -> LogLikelihood:
+        """The log likelihood, were what is emulated known."""
+        return self.log_likelihood
+
+    def log_second_moment(self, u: np.ndarray, runs: np.ndarray | None = None) -> np.ndarray:
+        """log E[L^2] [n] at u [n, d], L being known only through the surrogate; or the expectation
+        of E[L | a run]^2 [n, m] before a run is made at each of `runs` [m, d]."""
+        known = 2.0 * np.asarray(self.log_likelihood(u))
+        return known if runs is None else np.repeat(known[:, None], len(runs), axis=1)
+
+    def log_success(self, u: np.ndarray) -> np.ndarray:
+        """Log probability [n] that a run at u [n, d] succeeds."""
+        return np.zeros(len(u))
+
+    def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
+        """The quantity of `predict`, for n finished runs [n, ...]."""
+        return features
+
+    def constants(self) -> dict[str, np.ndarray]:
+        """Constants of the likelihood, kept with the posterior."""
+        return {}
+
+    def described(self) -> list[str]:
+        """The most important constants, in a few words."""
+        return []
+
+    def checks(self) -> dict[str, np.ndarray]:
+        """Of the emulator: `loo_z`, studentised leave-one-out errors [n, ...], a row for each
+        simulation that was learned from."""
+        return {}
 
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
         """One new observation for each row of u [n, d]: name -> [n, ...]."""
+        return {}
+
+
+class Family(Protocol):
+    """How runs are compared with what was observed, and what is learned of them.
+
+    Attributes:
+        acquisition: Name of the rule that chooses where nobody says which.
+        replicates: Whether some points are simulated twice, to show run-to-run noise.
+    """
+
+    acquisition: ClassVar[str] = "draws"
+    replicates: ClassVar[bool] = False
+
+    def learn(self, data: TrainingData, key: jax.Array) -> Surrogate:
+        """The surrogate on which a fit rests; `key` fixes what is random."""
         ...
+
+    def search(self, data: TrainingData, key: jax.Array, previous: Any) -> Surrogate:
+        """The surrogate to search with; `previous` was learned from the first of these data, or is
+        None."""
+        return self.learn(data, key)
+
+    @property
+    def name(self) -> str:
+        """Kept with the results."""
+        return type(self).__name__
+
+    @property
+    def any_shape(self) -> bool:
+        """Whether signals may have another shape than what was observed."""
+        return False
+
+    def observe(self, observed: ArrayLike | None) -> np.ndarray:
+        """The observed output, float64.
+
+        Raises:
+            ValueError: it cannot be learned from.
+        """
+        if observed is None:
+            raise ValueError(
+                "observed must be an array of numbers, got None; a simulator that returns the log "
+                'likelihood needs surrogate="log_likelihood", losses need fit_losses'
+            )
+        array = checked_array("observed", observed)
+        if np.isinf(array).any():
+            raise ValueError("observed must not be infinite; NaN is a missing sample")
+        return array
+
+    def measure(self, observed: np.ndarray, signals: Sequence[np.ndarray | None]) -> Measured:
+        """Features and discrepancies of n signals, None where a run failed: here the values of
+        each, and the sum of their squared differences to what was observed."""
+        features = np.full((len(signals), observed.size), np.nan)
+        for row, signal in zip(features, signals, strict=True):
+            if signal is not None and signal.shape == observed.shape:
+                row[:] = signal.ravel()
+        return Measured(features, *evaluate(sum_of_squares, observed, signals))
 
 
 class Acquisition(Protocol):
@@ -152,16 +211,14 @@ class SurrogateView:
         output's values; the sd holds run-to-run noise, but no measurement noise.
         """
         u = self.prior.to_unit(theta)
-        mean, sd = self.learned.predict(u.reshape(-1, u.shape[-1]))
-        return _shaped(mean, u.shape[:-1]), _shaped(sd, u.shape[:-1])
+        mean, sd = (
+            np.reshape(part, (*u.shape[:-1], *np.shape(part)[1:]))
+            for part in self.learned.predict(u.reshape(-1, u.shape[-1]))
+        )
+        return mean, sd
 
     @property
     @in_float64
     def warnings(self) -> list[str]:
         """Warnings of the surrogate's own checks, in sentences."""
         return self.learned.warnings()
-
-
-def _shaped(rows: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """[n, ...] -> [*shape, ...]."""
-    return np.reshape(rows, (*shape, *np.shape(rows)[1:]))

@@ -1,12 +1,15 @@
 """The paper's surrogate: a Gaussian process on the (transformed) discrepancy."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
+import jax
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..arguments import check_callable
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
-from ..gp.optimise import surely_least
 from ..gp.process import (
     GP,
     Data,
@@ -16,21 +19,28 @@ from ..gp.process import (
     leave_one_out_errors,
     predict,
 )
+from ..types import Discrepancy
+from .base import Family, Measured, TrainingData
+from .processes import OfProcesses
+from .squared_difference import MIN_FREEDOM, evaluate, independent, numbers, squared_difference
+from .success import learn_success
 from .threshold import (
     Matched,
     Threshold,
-    ThresholdState,
+    ThresholdLikelihood,
+    check_rule,
     choose_threshold,
-    log_likelihood,
-    log_second_moment,
     matched,
 )
-from .transform import Transform, candidates
+from .transform import Transform, candidates, check_transform
 from .warnings import (
     EQUAL,
+    GUESSED,
     LOW_THRESHOLD,
+    NEGATIVE,
     NOISY,
     complaints,
+    distance_warnings,
 )
 
 BETWEEN = 0.25  # of the least simulated discrepancy: the least that is taken for its minimum
@@ -54,11 +64,11 @@ class DiscrepancyScale(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class DiscrepancySurrogate:
+class DiscrepancySurrogate(OfProcesses):
     """GP of g(Delta); see `learn`.
 
     Attributes:
-        gp: The conditioned process.
+        process: The conditioned process.
         scale: g, and the standardisation of g(Delta).
         discrepancy: What was learned from [n].
         threshold: eps on the scale of g(Delta).
@@ -73,7 +83,7 @@ class DiscrepancySurrogate:
         said: What the outputs, of which the surrogate knows nothing, have been found to lack.
     """
 
-    gp: GP
+    process: GP
     scale: DiscrepancyScale
     discrepancy: np.ndarray
     threshold: float
@@ -85,8 +95,9 @@ class DiscrepancySurrogate:
     resolution: float = np.inf
     said: tuple[str, ...] = ()
 
-    log_likelihood = staticmethod(log_likelihood)
-    log_second_moment = staticmethod(log_second_moment)
+    @property
+    def gp(self) -> GP:
+        return self.process
 
     @property
     def equal(self) -> bool:
@@ -98,24 +109,20 @@ class DiscrepancySurrogate:
         return self.scale.transform
 
     @property
-    def state(self) -> ThresholdState:
+    def log_likelihood(self) -> ThresholdLikelihood:
         threshold = (self.threshold - self.scale.location) / self.scale.spread
         width, resolution = (
             np.asarray(part / self.scale.spread) for part in (self.width, self.resolution)
         )
-        return ThresholdState(self.gp, np.asarray(threshold), width, resolution, self.success)
+        return ThresholdLikelihood(self.gp, np.asarray(threshold), width, resolution, self.success)
 
     @property
     def cautious(self) -> "DiscrepancySurrogate":
         """The surrogate to which doubt beyond what the threshold can resolve is no agreement."""
-        mean, _ = self.predict(self.gp.data.u)
+        mean, _ = self.predict(self.u)
         noise = self.scale.spread * float(np.exp(self.gp.hyper.log_noise[0]))
         scales = float(np.hypot(noise, self.width)), self.threshold - float(mean.min())
         return replace(self, resolution=max(*scales, MIN_RESOLUTION * self.scale.spread))
-
-    @property
-    def sure(self) -> ThresholdState:
-        return self.state._replace(doubt=np.zeros(()))
 
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new g(Delta), its noise included, at quantiles u [n, d]: [n], [n]."""
@@ -127,13 +134,17 @@ class DiscrepancySurrogate:
         """g(Delta) [n], capped at the worst run that was learned from."""
         return self.transform(np.minimum(discrepancy, self.discrepancy.max()))
 
-    def minimum(self) -> np.ndarray:
-        """Where the discrepancy is surely low, u [d]."""
-        return surely_least(self.gp)
+    def lower_bound(self, u: np.ndarray, width: float) -> np.ndarray:
+        """mu - width sqrt(v) at u [n, d], v the variance of the latent mean (without noise).
+
+        In standard deviations of the targets, less the log chance that a run at u succeeds.
+        """
+        (mean,), (variance,) = predict(self.gp, u)
+        return mean - width * np.sqrt(variance) - self.log_success(u)
 
     def fantasize(self, u: np.ndarray) -> "DiscrepancySurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
-        return replace(self, gp=fantasize(self.gp, u)) if len(u) else self
+        return replace(self, process=fantasize(self.gp, u)) if len(u) else self
 
     def constants(self) -> dict[str, np.ndarray]:
         """The threshold, on the scale of g(Delta)."""
@@ -150,7 +161,7 @@ class DiscrepancySurrogate:
     @property
     def fits(self) -> bool:
         """Whether discrepancies as low as the threshold can be expected anywhere."""
-        mean, sd = self.predict(self.gp.data.u)
+        mean, sd = self.predict(self.u)
         low = LOW * np.hypot(sd, self.width)
         return self.equal or bool((self.threshold > mean - low).any())
 
@@ -244,15 +255,15 @@ def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> Discrepanc
     """
 
     def at_minimum() -> tuple[float, float]:
-        mean, sd = learned.predict(learned.gp.data.u)
+        mean, sd = learned.predict(learned.u)
         best = np.argmin(mean)
         return float(mean[best]), float(sd[best])
 
     if rule is None or isinstance(rule, Matched):
-        d = learned.gp.data.u.shape[1]
+        d = learned.u.shape[1]
         matching = Matched(d + UNKNOWN_FREEDOM) if rule is None else rule
         least = at_minimum()
-        mean, sd = (float(part[0]) for part in learned.predict(learned.minimum()[None]))
+        mean, sd = (float(part[0]) for part in learned.predict(learned.best()[None]))
         # between the runs the least may be lower, but not out of all proportion
         if learned.transform.inverse(np.asarray(mean)) > BETWEEN * learned.discrepancy.min():
             least = min(least, (mean, sd))
@@ -283,3 +294,82 @@ def _score(gp: GP, scale: DiscrepancyScale, values: np.ndarray) -> float:
     density = -0.5 * (residual**2 / variance + np.log(2.0 * np.pi * variance))
     jacobian = scale.transform.log_jacobian(values) - np.log(scale.spread)
     return float(np.sum((density + jacobian)[values <= np.median(values)]))
+
+
+@dataclass(frozen=True)
+class DiscrepancyFamily(Family):
+    """A Gaussian process on the discrepancy, and a threshold on it: the paper's.
+
+    Attributes:
+        discrepancy: Callable (observed, simulated) -> float; None is `squared_difference()`.
+        transform: "identity", "sqrt" or "log" of the discrepancy; None chooses by
+            leave-one-out log predictive density.
+        threshold: Rule for eps; None makes the posterior as wide as the closest run's residual
+            suggests, see `threshold.matched`, or guesses of fewer than 3 numbers more than
+            parameters; or a number on the discrepancy's own scale, which may be
+            negative where a user's discrepancy is, as a logarithm; see
+            `threshold.choose_threshold`.
+    """
+
+    acquisition: ClassVar[str] = "cautious"
+
+    discrepancy: Discrepancy | None = None
+    transform: str | None = None
+    threshold: Threshold = None
+
+    def __post_init__(self) -> None:
+        check_rule(self.threshold)
+        check_callable("discrepancy", self.discrepancy)
+        check_transform(self.transform)
+
+    @property
+    def name(self) -> str:
+        return "discrepancy"
+
+    @property
+    def any_shape(self) -> bool:
+        return self.discrepancy is not None
+
+    def observe(self, observed: ArrayLike | None) -> np.ndarray:
+        array = super().observe(observed)
+        if self.discrepancy is None:
+            squared_difference()(array, array)  # raises if it cannot be used
+        return array
+
+    def measure(self, observed: np.ndarray, signals: Sequence[np.ndarray | None]) -> Measured:
+        """Features are the signal, NaN where it has another shape than what was observed."""
+        features = super().measure(observed, signals).features
+        distance = self.discrepancy or squared_difference()
+        return Measured(features, *evaluate(distance, observed, signals))
+
+    def search(
+        self, data: TrainingData, key: jax.Array, previous: DiscrepancySurrogate | None
+    ) -> DiscrepancySurrogate:
+        """Errors count as independent, lest a poor start leave it undecided."""
+        return self._learn(data, previous, self._rule(data, numbers))
+
+    def learn(self, data: TrainingData, key: jax.Array) -> DiscrepancySurrogate:
+        rule = self._rule(data, independent)
+        said = () if rule is not None else (GUESSED,)
+        if self.threshold is None and data.discrepancy.min() < 0.0:
+            said = (NEGATIVE,)
+        if self.discrepancy is None:
+            order = np.argsort(data.discrepancy)
+            outputs = data.features[order].reshape(-1, *data.observed.shape)
+            said += tuple(distance_warnings(data.observed, outputs))
+        return replace(self._learn(data, None, rule).cautious, said=said)
+
+    def _learn(
+        self, data: TrainingData, previous: DiscrepancySurrogate | None, rule: Threshold
+    ) -> DiscrepancySurrogate:
+        learned = learn(data.u, data.discrepancy, self.transform, previous, data.normal)
+        learned = replace(learned, success=learn_success(data.runs, data.normal))
+        return learned if rule is None else with_threshold(learned, rule)
+
+    def _rule(self, data: TrainingData, number: Callable[[np.ndarray], float]) -> Threshold:
+        """The threshold that was given, or the one that fits the residual of the closest run."""
+        closest = data.features[np.argmin(data.discrepancy)]
+        residual = closest.reshape(data.observed.shape) - data.observed
+        if self.threshold is not None or numbers(residual) - data.u.shape[1] < MIN_FREEDOM:
+            return self.threshold
+        return Matched(number(residual))

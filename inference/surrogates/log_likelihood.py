@@ -2,14 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
+import jax
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import ndtr, ndtri
 
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.namespaces import namespace
-from ..gp.optimise import surely_least
 from ..gp.process import (
     GP,
     Data,
@@ -22,7 +23,8 @@ from ..gp.process import (
 from ..sampling.importance import explore
 from ..sampling.target import Target
 from ..simulations.failures import Failure, impossible, incomparable, not_finite
-from .base import Measured, TrainingData
+from .base import Family, Measured, TrainingData
+from .processes import OfProcesses
 from .success import learn_success, log_success
 from .warnings import EQUAL, UNCERTAIN, complaints
 
@@ -74,11 +76,9 @@ def expanded(height: Any, linear: float | np.ndarray) -> Any:
     return xp.where(height < linear, height, linear * xp.exp(folds))
 
 
-class LevelState(NamedTuple):
-    """Arrays on which the likelihood depends.
-
-    A fit takes the harmonic mean of what the likelihood may be, a search the bound that lies
-    `optimism` sds above its median.
+class LevelLikelihood(NamedTuple):
+    """The likelihood: for a fit the harmonic mean of what it may be, for a search the bound that
+    lies `optimism` sds above its median.
     """
 
     gp: GP
@@ -88,69 +88,63 @@ class LevelState(NamedTuple):
     optimism: np.ndarray = np.zeros(())
     rise: np.ndarray = np.full((), MAX_RISE)  # nats above the best value that count at most
 
+    def __call__(self, u: Any) -> Any:
+        """log P(success) plus the log likelihood of which the process tells, at u [n, d]: [n].
 
-def log_likelihood(state: LevelState, u: Any) -> Any:
-    """log P(success) plus the log likelihood of which the process tells, at u [n, d]: [n].
+        Where its latent value has mean m and variance v, the median of the likelihood is exp(m)
+        (Jarvenpaa et al. 2021), its mean exp(m + v / 2), which explodes where nothing is known, and
+        its harmonic mean exp(m - v / 2): what is not known explains nothing. With `doubt` it is the
+        last.
+        """
+        xp = namespace(u)
+        mean, variance = predict(self.gp, u)
+        doubt = 0.5 * self.doubt * self.scale.spread * variance[0]
+        latent = mean[0] + doubt - self.optimism * xp.sqrt(variance[0])
+        return self._values(latent) + log_success(self.success, u)
 
-    Where its latent value has mean m and variance v, the median of the likelihood is exp(m)
-    (Jarvenpaa et al. 2021), its mean exp(m + v / 2), which explodes where nothing is known, and
-    its harmonic mean exp(m - v / 2): what is not known explains nothing. With `doubt` it is the
-    last.
-    """
-    xp = namespace(u)
-    mean, variance = predict(state.gp, u)
-    doubt = 0.5 * state.doubt * state.scale.spread * variance[0]
-    latent = mean[0] + doubt - state.optimism * xp.sqrt(variance[0])
-    return _values(state, latent) + log_success(state.success, u)
+    def _values(self, latent: Any) -> Any:
+        return namespace(latent).minimum(self.scale.values(latent), self.scale.top + self.rise)
 
+    def second_moment(self, u: np.ndarray, spread: np.ndarray | None) -> np.ndarray:
+        """log (L^2 + R^2), R the interquartile range of the likelihood: [n] or [n, ...].
 
-def _values(state: LevelState, latent: Any) -> Any:
-    return namespace(latent).minimum(state.scale.values(latent), state.scale.top + state.rise)
+        A likelihood's own second moment explodes where it is not known; its interquartile range is
+        what Jarvenpaa et al. (2021) put in the variance's place.
 
-
-def log_second_moment(state: LevelState, u: np.ndarray, spread: np.ndarray | None) -> np.ndarray:
-    """log (L^2 + R^2), R the interquartile range of the likelihood: [n] or [n, ...].
-
-    A likelihood's own second moment explodes where it is not known; its interquartile range is
-    what Jarvenpaa et al. (2021) put in the variance's place.
-
-    Args:
-        spread: Variance of the latent value that varies, [n, ..., 1]; None is all of it.
-    """
-    mean, variance = (part[0] for part in predict(state.gp, u))
-    varying = variance if spread is None else spread[..., 0]
-    shape = len(u), *[1] * (varying.ndim - 1)
-    mean, reach = mean.reshape(shape), UPPER_QUARTILE * np.sqrt(np.maximum(varying, 0.0))
-    high, low = _values(state, mean - reach), _values(state, mean + reach)
-    log_range = high + np.log(-np.expm1(-np.maximum(high - low, 1e-12)))
-    log_range = log_range + log_success(state.success, u).reshape(shape)
-    return np.logaddexp(2.0 * log_likelihood(state, u).reshape(shape), 2.0 * log_range)
+        Args:
+            spread: Variance of the latent value that varies, [n, ..., 1]; None is all of it.
+        """
+        mean, variance = (part[0] for part in predict(self.gp, u))
+        varying = variance if spread is None else spread[..., 0]
+        shape = len(u), *[1] * (varying.ndim - 1)
+        mean, reach = mean.reshape(shape), UPPER_QUARTILE * np.sqrt(np.maximum(varying, 0.0))
+        high, low = self._values(mean - reach), self._values(mean + reach)
+        log_range = high + np.log(-np.expm1(-np.maximum(high - low, 1e-12)))
+        log_range = log_range + log_success(self.success, u).reshape(shape)
+        return np.logaddexp(2.0 * self(u).reshape(shape), 2.0 * log_range)
 
 
 @dataclass(frozen=True, eq=False)
-class LogLikelihoodSurrogate:
+class LogLikelihoodSurrogate(OfProcesses):
     """See `learn`.
 
     Attributes:
-        state: The process of depths, and how they become log likelihoods.
+        level: The process of depths, and how they become log likelihoods.
         values: Log likelihoods that were learned from [n].
         learned_at: How many were known when the hyperparameters were found.
     """
 
-    state: LevelState
+    level: LevelLikelihood
     values: np.ndarray
     learned_at: int
 
-    log_likelihood = staticmethod(log_likelihood)
-    log_second_moment = staticmethod(log_second_moment)
-
     @property
     def gp(self) -> GP:
-        return self.state.gp
+        return self.level.gp
 
     @property
-    def success(self) -> GP | None:
-        return self.state.success
+    def log_likelihood(self) -> LevelLikelihood:
+        return self.level
 
     @property
     def cautious(self) -> "LogLikelihoodSurrogate":
@@ -159,17 +153,9 @@ class LogLikelihoodSurrogate:
         Where runs failed, what is extrapolated beyond their border must not outweigh
         log P(success).
         """
-        rise = np.full((), np.inf) if self.state.success is None else self.state.rise
-        state = self.state._replace(doubt=np.ones(()), optimism=np.zeros(()), rise=rise)
-        return replace(self, state=state)
-
-    @property
-    def sure(self) -> LevelState:
-        return self.state._replace(doubt=np.zeros(()))
-
-    def minimum(self) -> np.ndarray:
-        """Where the log likelihood is surely high, u [d]."""
-        return surely_least(self.gp)
+        rise = np.full((), np.inf) if self.level.success is None else self.level.rise
+        level = self.level._replace(doubt=np.ones(()), optimism=np.zeros(()), rise=rise)
+        return replace(self, level=level)
 
     def fantasize(self, u: np.ndarray) -> "LogLikelihoodSurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
@@ -177,13 +163,13 @@ class LogLikelihoodSurrogate:
             return self
         noise = self.gp.data.spread
         usual = None if noise is None else np.full(len(u), np.median(noise))
-        return replace(self, state=self.state._replace(gp=fantasize(self.gp, u, usual)))
+        return replace(self, level=self.level._replace(gp=fantasize(self.gp, u, usual)))
 
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new log likelihood, its noise included, at u [n, d]: [n], [n]."""
         mean, variance = predict(self.gp, u)
         sd = np.sqrt(variance[0] + np.exp(2.0 * self.gp.hyper.log_noise[0]))
-        scale, values = self.state.scale, self.state.scale.values(mean[0])
+        scale, values = self.level.scale, self.level.scale.values(mean[0])
         return values, scale.spread * scale.folds(values) * sd
 
     def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
@@ -192,8 +178,8 @@ class LogLikelihoodSurrogate:
 
     def constants(self) -> dict[str, np.ndarray]:
         """The best log likelihood, and the sd of one estimate's noise near it, in nats."""
-        noise = self.state.scale.spread * np.exp(self.gp.hyper.log_noise[0])
-        return {"best_log_likelihood": self.state.scale.top, "noise": noise}
+        noise = self.level.scale.spread * np.exp(self.gp.hyper.log_noise[0])
+        return {"best_log_likelihood": self.level.scale.top, "noise": noise}
 
     def described(self) -> list[str]:
         """The noise of a log likelihood near the best one."""
@@ -202,11 +188,6 @@ class LogLikelihoodSurrogate:
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, 1] of the compressed depths."""
         return {"loo_z": leave_one_out_errors(self.gp, len(self.values))}
-
-    @property
-    def fits(self) -> bool:
-        """Always: no data are compared here."""
-        return True
 
     def warnings(self, *, confirmed: bool = False) -> list[str]:
         """Warnings of the leave-one-out errors at depths that count, unless confirmed; and
@@ -220,9 +201,9 @@ class LogLikelihoodSurrogate:
     def _uncertain(self) -> float:
         """Share of the median likelihood's posterior where its log is not known to MAX_SD, or
         exceeds the best value by MAX_RISE."""
-        median = self.state._replace(doubt=np.zeros(()), optimism=np.zeros(()))
-        target = Target(log_likelihood, median, self.gp.data.u.shape[1])
-        population, scale = explore(np.random.default_rng(0), target), self.state.scale
+        median = self.level._replace(doubt=np.zeros(()), optimism=np.zeros(()))
+        target = Target(median, self.u.shape[1])
+        population, scale = explore(np.random.default_rng(0), target), self.level.scale
         mean, variance = (part[0] for part in predict(self.gp, ndtr(population.x)))
         unknown = scale.spread * np.sqrt(variance) > MAX_SD
         extrapolated = scale.values(mean) > scale.top + MAX_RISE
@@ -253,8 +234,8 @@ def learn(
         normal: Which parameters the kernel sees as normal scores [d], see `gp.process.coordinates`.
     """
     kept = previous if previous and len(u) < GROWTH * previous.learned_at else None
-    if kept is not None and values.max() < kept.state.scale.top + NEAR:
-        scale, learned_at = kept.state.scale, kept.learned_at
+    if kept is not None and values.max() < kept.level.scale.top + NEAR:
+        scale, learned_at = kept.level.scale, kept.learned_at
         gp = condition(kept.gp.hyper, _data(u, values, sd, scale, normal))
     else:
         fitted = []
@@ -263,8 +244,8 @@ def learn(
             fitted.append((condition(maximum_a_posteriori(data), data), scale))
         gp, scale = max(fitted, key=lambda one: _score(one[0], one[1], values))
         learned_at = len(u)
-    state = LevelState(gp, scale, doubt=np.zeros(()), optimism=np.asarray(OPTIMISM))
-    return LogLikelihoodSurrogate(state, values, learned_at)
+    level = LevelLikelihood(gp, scale, doubt=np.zeros(()), optimism=np.asarray(OPTIMISM))
+    return LogLikelihoodSurrogate(level, values, learned_at)
 
 
 def _scales(values: np.ndarray) -> list[LogLikelihoodScale]:
@@ -306,29 +287,32 @@ def _data(
 
 
 @dataclass(frozen=True)
-class LogLikelihoodFamily:
+class LogLikelihoodFamily(Family):
     """A Gaussian process on the log likelihood that the simulator itself returns.
 
     A simulator returns a number, or two of which the second is the sd of the first one's noise.
     -inf is where the data are impossible. Nothing is observed beside.
     """
 
-    name: ClassVar[str] = "log_likelihood"
-    acquisition: ClassVar[str] = "draws"
-    replicates: ClassVar[bool] = False
+    @property
+    def name(self) -> str:
+        return "log_likelihood"
 
-    def learner(self, observed: np.ndarray) -> "LogLikelihoodLearner":
-        return LogLikelihoodLearner()
+    @property
+    def any_shape(self) -> bool:
+        return True
 
+    def observe(self, observed: ArrayLike | None) -> np.ndarray:
+        """NaN: the simulator compares with the data itself."""
+        if observed is None:
+            return np.array(np.nan)
+        raise ValueError(
+            'surrogate="log_likelihood" takes no observed: the simulator compares with the data '
+            f"itself, and returns the log likelihood; leave it out, got {observed!r:.100}"
+        )
 
-class LogLikelihoodLearner:
-    """Log likelihoods are learned from as they are; the discrepancy is minus one."""
-
-    any_shape: ClassVar[bool] = True
-
-    def measure(self, signals: Sequence[np.ndarray | None]) -> Measured:
-        """Sds of the noise [n, 1], NaN where none is given, and minus the log likelihoods of n
-        signals, None where a run failed."""
+    def measure(self, observed: np.ndarray, signals: Sequence[np.ndarray | None]) -> Measured:
+        """Sds of the noise [n, 1], NaN where none is given, and minus the log likelihoods."""
         found = np.full((len(signals), 2), np.nan)
         errors: list[Failure | None] = [None] * len(signals)
         for i, signal in enumerate(signals):
@@ -339,18 +323,17 @@ class LogLikelihoodLearner:
                 found[i, : signal.size] = signal.ravel()
         return Measured(found[:, 1:], -found[:, 0], errors)
 
-    def learn(
-        self, known: TrainingData, previous: LogLikelihoodSurrogate | None
+    def search(
+        self, data: TrainingData, key: jax.Array, previous: LogLikelihoodSurrogate | None
     ) -> LogLikelihoodSurrogate:
-        """To search with: where a run was unlucky others are to be made."""
-        values, sd = -known.discrepancy, known.features[:, 0]
-        learned = learn(known.u, values, sd, previous, known.normal)
-        success = learn_success(known.runs, known.normal)
-        return replace(learned, state=learned.state._replace(success=success))
+        """Optimistic: where a run was unlucky others are to be made."""
+        values, sd = -data.discrepancy, data.features[:, 0]
+        learned = learn(data.u, values, sd, previous, data.normal)
+        success = learn_success(data.runs, data.normal)
+        return replace(learned, level=learned.level._replace(success=success))
 
-    def finish(self, known: TrainingData) -> LogLikelihoodSurrogate:
-        """The surrogate on which a fit rests."""
-        return self.learn(known, None).cautious
+    def learn(self, data: TrainingData, key: jax.Array) -> LogLikelihoodSurrogate:
+        return self.search(data, key, None).cautious
 
 
 def _unlikely(signal: np.ndarray) -> Failure | None:

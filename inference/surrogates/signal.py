@@ -1,25 +1,37 @@
 """The surrogate that emulates the output itself, and compares it with what was observed."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from typing import ClassVar
 
+import jax
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .._lazy import stats
+from ..arguments import check_callable, check_flag, checked_integer, checked_number
 from ..gp.optimise import minimise_in_box
 from ..gp.process import GP, fantasize
+from ..simulations.failures import Failure, not_finite
 from ..sobol import sobol
+from ..types import Discrepancy
+from .base import Family, Measured, TrainingData
 from .emulator import (
+    PREDICTED_SHARE,
     Emulator,
+    EmulatorLimits,
     borne_out,
+    emulate,
+    goes_on,
     loo_errors,
     noise_share,
     noise_variance,
     predict,
     predictive_draws,
+    resized,
     smallest_misfit,
 )
-from .given_noise import GivenNoise, NoiseModel
+from .given_noise import Covariance, GivenNoise, NoiseModel, check_noise, given_noise
 from .measurement_noise import (
     CORRELATIONS,
     FEW_CORRELATIONS,
@@ -40,16 +52,14 @@ from .measurement_noise import (
     residual_size,
     with_misfit,
 )
+from .noise.by_mean import ByMean, SdOfMean, law_of
 from .noise.run_size import run_spread
-from .noise.scales import OutputScale, Plain, in_units
-from .output_vectors import Output
-from .signal_likelihood import (
-    SignalState,
-    log_likelihood,
-    log_second_moment,
-    node_log_densities,
-    state_of,
-)
+from .noise.scales import OutputScale, Plain, comparable, in_units
+from .output_vectors import Output, Summary, describe, infinities, summarise
+from .processes import OfProcesses
+from .signal_likelihood import SignalLikelihood, likelihood_of, node_log_densities
+from .squared_difference import MIN_FREEDOM, evaluate, failed_on, sum_of_squares
+from .success import learn_success
 from .warnings import (
     EQUAL,
     FALSE_ALARMS,
@@ -62,19 +72,22 @@ from .warnings import (
     UNPREDICTED,
     complaints,
     noise_warnings,
+    range_warnings,
+    unreached_warnings,
 )
 
 KEPT_NODES = 12  # nodes of unknown measurement noise that enter the likelihood
 SCREENED_POINTS = 128
 MISFIT_POINTS = 1024  # among which the smallest misfit is looked for
-MIN_FREEDOM = 3  # numbers more than parameters, from which the size of the noise can be told
 NEEDED = 0.95  # posterior probability of a misfit from which it is said
 LEAST_SEEN = 0.01  # of the outputs' sd, from which a misfit is worth a word
+MAX_COMPONENTS = 8
+LEFT_OF_NOISE = 0.02  # of the variance of noise by the mean, that components may leave
 SLOW = 0.9  # correlation of neighbouring samples from which noise looks like a signal
 
 
 @dataclass(frozen=True, eq=False)
-class SignalSurrogate:
+class SignalSurrogate(OfProcesses):
     """An emulator, and what the observed output says of its scores.
 
     Attributes:
@@ -104,26 +117,19 @@ class SignalSurrogate:
     success: GP | None = None
     scale: OutputScale = Plain(np.zeros(0), None)
 
-    log_likelihood = staticmethod(log_likelihood)
-    log_second_moment = staticmethod(log_second_moment)
-
     @property
     def gp(self) -> GP:
         return self.emulator.gp
 
     @property
-    def cautious(self) -> "SignalSurrogate":
-        """Itself: misfits of every size have a prior, so large variance is no agreement."""
-        return self
-
-    @cached_property
-    def state(self) -> SignalState:
-        return state_of(self.emulator, self.reduced, self.box)._replace(success=self.success)
+    def log_likelihood(self) -> SignalLikelihood:
+        found = likelihood_of(self.emulator, self.reduced, self.box)
+        return found._replace(success=self.success)
 
     @property
-    def sure(self) -> SignalState:
-        """The state, were the simulator the emulator's mean. What looks like run-to-run noise, but
-        repeated runs do not bear out, is doubt, too."""
+    def sure(self) -> SignalLikelihood:
+        """The log likelihood, were the simulator the emulator's mean. What looks like run-to-run
+        noise, but repeated runs do not bear out, is doubt, too."""
         found, share = self, max(borne_out(self.emulator), MIN_SIZE**2)
         if share < 1.0:
             white, factors = self.emulator.remainder.white, self.emulator.remainder.factors
@@ -133,12 +139,12 @@ class SignalSurrogate:
             known = NoiseModel(self.known, 0.0)
             found = observe(emulator, self.output, self.observed, known, previous=self)
             found = replace(found, box=self.box, success=self.success)
-        return found.state._replace(doubt=np.zeros(()))
+        return found.log_likelihood._replace(doubt=np.zeros(()))
 
-    def minimum(self) -> np.ndarray:
+    def best(self) -> np.ndarray:
         """Maximiser of the likelihood over the box, u [d]."""
-        state = self.state
-        return minimise_in_box(lambda u: -log_likelihood(state, u), len(state.low), *self.box or ())
+        likelihood = self.log_likelihood
+        return minimise_in_box(lambda u: -likelihood(u), self.u.shape[1], *self.box or ())
 
     def fantasize(self, u: np.ndarray) -> "SignalSurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
@@ -150,14 +156,14 @@ class SignalSurrogate:
     @property
     def node_weights(self) -> np.ndarray:
         """Posterior weights of the nodes, given the best parameters."""
-        log_weights = node_log_densities(self.state, self.minimum()[None])[0]
+        log_weights = node_log_densities(self.log_likelihood, self.best()[None])[0]
         weights = np.exp(log_weights - log_weights.max())
         return weights / weights.sum()
 
     @property
     def best_features(self) -> np.ndarray:
         """Predicted features at the best parameters, on the emulator's scale [m]."""
-        return predict(self.emulator, self.minimum()[None])[0][0]
+        return predict(self.emulator, self.best()[None])[0][0]
 
     @property
     def misfit_probability(self) -> float:
@@ -194,10 +200,6 @@ class SignalSurrogate:
         mean, sd = predict(self.emulator, u)
         return self.scale.back(mean), in_units(self.scale, mean, sd)
 
-    def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
-        """The outputs' values [n, m]."""
-        return features
-
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, components in use]."""
         return {"loo_z": loo_errors(self.emulator)}
@@ -214,8 +216,9 @@ class SignalSurrogate:
         repeats, sized = self.emulator.repeats, self.emulator.size is not None
         if self.emulator.basis.used == 0 and not sized:
             if self.emulator.equal:
-                return [EQUAL]
-            return [TOO_FAST if len(repeats) and not repeats.any() else UNPREDICTED]
+                return [EQUAL, *self._of_data()]
+            fast = len(repeats) and not repeats.any()
+            return [TOO_FAST if fast else UNPREDICTED, *self._of_data()]
         said = [] if confirmed else complaints(loo_errors(self.emulator), "output")
         said += noise_warnings(noise_share(self.emulator), repeats, sized)
         if self._outside():
@@ -226,9 +229,21 @@ class SignalSurrogate:
             said.append(SMOOTH)
         elif self._generous():
             said.append(GENEROUS)
-        if self.known is None and len(self.observed) - self.gp.data.u.shape[1] < MIN_FREEDOM:
+        if self.known is None and len(self.observed) - self.u.shape[1] < MIN_FREEDOM:
             said.append(FEW_NUMBERS)
-        return said
+        return said + self._of_data()
+
+    def _of_data(self) -> list[str]:
+        """Warnings of the observed values themselves."""
+        ranges = range_warnings(self.scale.observed) if self.known is None else []
+        return ranges + self.unreached
+
+    @property
+    def unreached(self) -> list[str]:
+        """That an emulated number lies beyond all simulated ones, if it does."""
+        values = self.scale.observed
+        noise = float(self.scale.sds(values[None])[0, 0])
+        return unreached_warnings(values, self.scale.back(self.emulator.outputs), noise)
 
     def _missed(self) -> bool:
         """Whether the given noise does not explain what was observed."""
@@ -236,7 +251,7 @@ class SignalSurrogate:
 
     def _generous(self) -> bool:
         """Whether a simulation misses independent data by less than the given noise allows."""
-        freedom = len(self.observed) - self.gp.data.u.shape[1]
+        freedom = len(self.observed) - self.u.shape[1]
         known, even = self.known, isinstance(self.scale, Plain) and freedom >= MIN_FREEDOM
         if not even or known is None or known.factors.size or not known.white.all():
             return False
@@ -370,7 +385,7 @@ def _widen(reduced: Reduced, emulator: Emulator) -> Reduced:
 def _keep(emulator: Emulator, reduced: Reduced, nodes: Nodes) -> np.ndarray:
     """The nodes of most evidence, best first, on an even screen of the prior and at the data; none
     of these need come so near that the given noise explains the rest, so that it is kept."""
-    terms = node_log_densities(state_of(emulator, reduced), _screen(emulator, SCREENED_POINTS))
+    terms = node_log_densities(likelihood_of(emulator, reduced), _screen(emulator, SCREENED_POINTS))
     evidence = np.where(nodes.sigma == 0.0, np.inf, np.logaddexp.reduce(terms, 0))
     return np.argsort(-evidence)[:KEPT_NODES]
 
@@ -379,3 +394,151 @@ def _screen(emulator: Emulator, count: int) -> np.ndarray:
     """`count` points that fill the prior evenly, and the runs: prior quantiles [n, d]."""
     data = emulator.gp.data.u
     return np.concatenate([sobol(0, 0, count, data.shape[1]), data])
+
+
+@dataclass(frozen=True, eq=False)
+class SignalFamily(Family):
+    """Principal components of the output, a Gaussian process for each score.
+
+    Attributes:
+        summary: Callable output -> vector, of the observed and of each simulated output; None
+            takes the output as it is.
+        noise: Measurement noise that the simulator does not make: its sd, a number or an array
+            shaped like the observed (summarised) output; or sds [n], or a covariance [n, n], of
+            that output's n finite values, flattened; or an object that has such a covariance, as
+            `criticism.KnownNoise`, `model_error` and their `SumOfNoises`; 0 for none. "poisson"
+            where counts were observed and their means are simulated; `relative(0.2)` for an sd of
+            20 % of the simulated mean; or a function from simulated means to sds, value by value.
+            None estimates it: as an AR(1) process where the output is a series, of at least 5
+            samples without a summary.
+        varying_noise: Whether the noise that the simulator makes itself may depend on the
+            parameters and on the mean, where runs show that it does.
+        misfit: Prior probability that the data are missed by more than the given noise, because
+            the simulator errs or the noise is larger; its size is integrated out. 0 for never.
+        components: At most.
+        predicted: Share of a component's variance that the parameters must predict where its
+            run is left out; what they predict less counts as run-to-run noise. None emulates
+            every component, and takes some noise for structure if the simulator is noisy.
+        discrepancy: As in `DiscrepancyFamily`; it only ranks simulations and finds outputs that
+            blew up.
+    """
+
+    replicates: ClassVar[bool] = True
+
+    summary: Summary | None = None
+    noise: ArrayLike | Covariance | SdOfMean | None = None
+    misfit: float = 0.1
+    components: int = MAX_COMPONENTS
+    predicted: float | None = PREDICTED_SHARE
+    discrepancy: Discrepancy | None = None
+    varying_noise: bool = True
+
+    def __post_init__(self) -> None:
+        check_callable("summary", self.summary)
+        check_callable("discrepancy", self.discrepancy)
+        check_flag("varying_noise", self.varying_noise)
+        checked_integer("components", self.components)
+        if self.noise is not None and law_of(self.noise) is None:
+            check_noise(self.noise)  # pyright: ignore[reportArgumentType]  no function is left
+        checked_number("misfit", self.misfit, lambda p: 0.0 <= p < 1.0, "from 0 to below 1")
+        if self.predicted is not None:
+            due = "None or from 0 to below 1"
+            checked_number("predicted", self.predicted, lambda share: 0.0 <= share < 1.0, due)
+
+    @property
+    def name(self) -> str:
+        return "signal"
+
+    @property
+    def any_shape(self) -> bool:
+        return self.summary is not None
+
+    def observe(self, observed: ArrayLike | None) -> np.ndarray:
+        array = super().observe(observed)
+        self.view(array)  # raises if it cannot be used
+        return array
+
+    def view(self, observed: np.ndarray) -> tuple[Output, OutputScale]:
+        """How outputs become values, and the scale on which those are emulated."""
+        output = describe(observed, self.summary)
+        values, law = output.values(observed), law_of(self.noise)
+        if law is not None:
+            return output, ByMean(law, values, output.counts)
+        given = None if self.noise is None else given_noise(self.noise, output)  # pyright: ignore[reportArgumentType]  no function is left
+        return output, Plain(values, given)
+
+    def measure(self, observed: np.ndarray, signals: Sequence[np.ndarray | None]) -> Measured:
+        """Features are the output's values."""
+        output, scale = self.view(observed)
+        named = "summary" if self.discrepancy is None else "discrepancy"
+        distance = self.discrepancy or self._of_summaries
+        discrepancy, errors = evaluate(distance, observed, signals, named)
+        features = np.full((len(signals), len(scale.observed)), np.nan)
+        for i, signal in enumerate(signals):
+            if signal is None or not np.isfinite(discrepancy[i]):
+                errors[i] = errors[i] or self._infinite_summary(signal)
+                continue
+            try:
+                features[i] = output.values(signal)
+            except (Exception, SystemExit) as error:  # of the user's summary
+                errors[i] = failed_on("summary", signal, observed, error)
+            try:
+                scale.check(features[i])
+            except (Exception, SystemExit) as error:  # of the user's function of the mean
+                errors[i], features[i] = failed_on("noise", signal, observed, error), np.nan
+        failed = ~np.isfinite(features).all(1)
+        return Measured(features, np.where(failed, np.nan, discrepancy), errors)
+
+    def _of_summaries(self, observed: np.ndarray, simulated: np.ndarray) -> float:
+        return sum_of_squares(*(summarise(self.summary, one) for one in (observed, simulated)))
+
+    def _infinite_summary(self, signal: np.ndarray | None) -> Failure | None:
+        """The failure of a run whose signal is finite and its summary is not."""
+        compared = self.summary is not None and self.discrepancy is None
+        if not compared or signal is None or not np.isfinite(signal).all():
+            return None
+        values = summarise(self.summary, signal)
+        finite = bool(np.isfinite(values).all())
+        return None if finite else not_finite(f"summary returns {infinities(values)}")
+
+    def learn(self, data: TrainingData, key: jax.Array) -> SignalSurrogate:
+        return self.search(data, key, None)
+
+    def search(
+        self, data: TrainingData, key: jax.Array, previous: SignalSurrogate | None
+    ) -> SignalSurrogate:
+        output, scale = self.view(data.observed)
+        if previous is not None and goes_on(previous.emulator, previous.scale.of(data.features)):
+            scale = previous.scale
+        else:
+            previous = None
+            if self.varying_noise and isinstance(scale, Plain):
+                scale = scale.fitting(data.u, data.features, output.layout.channel)
+        emulator = self._emulator(data, output, scale, previous)
+        success = learn_success(data.runs, data.normal)
+
+        def compared(at: np.ndarray | None) -> SignalSurrogate:
+            """With what was observed, its noise being right around the features `at` [m]."""
+            seen, given = scale.seen(at)
+            noise = NoiseModel(given, self.misfit)
+            found = observe(emulator, output, seen, noise, previous)
+            return replace(found, success=success, scale=scale)
+
+        found = compared(None)
+        for _ in range(scale.rounds - 1):
+            found = compared(found.best_features)
+        return found
+
+    def _emulator(
+        self,
+        data: TrainingData,
+        output: Output,
+        scale: OutputScale,
+        previous: SignalSurrogate | None,
+    ) -> Emulator:
+        left = LEFT_OF_NOISE if isinstance(scale, ByMean) else np.inf
+        limits = EmulatorLimits(self.components, self.predicted, left)
+        features, units = scale.of(data.features), comparable(scale, output)
+        old = None if previous is None else previous.emulator
+        found = emulate(data.u, features, units, limits, old, data.normal)
+        return found if old or not self.varying_noise else resized(found, units)

@@ -18,8 +18,8 @@ SCORES_TOGETHER = 8  # by which the scores of padded states are counted
 WALL = 0.01  # of prior quantiles, beyond a box, over which the likelihood vanishes
 
 
-class SignalState(NamedTuple):
-    """Arrays on which the likelihood depends: k scores, g nodes of the noise.
+class SignalLikelihood(NamedTuple):
+    """The likelihood: k scores, g nodes of the noise.
 
     Scores that only fill an array come last, have `used` 0 and count as known.
     """
@@ -40,7 +40,7 @@ class SignalState(NamedTuple):
     unexplained: np.ndarray | None = None
     freedom: np.ndarray | None = None
 
-    def padded(self) -> "SignalState":
+    def padded(self) -> "SignalLikelihood":
         """The same likelihood with numbers of scores of which there are few."""
         g, k = self.estimate.shape
         total = SCORES_TOGETHER * max(1, -(-k // SCORES_TOGETHER))
@@ -54,13 +54,52 @@ class SignalState(NamedTuple):
             covariance=covariance,
         )
 
+    def __call__(self, u: Any) -> Any:
+        """log P(success) sum_g w_g N(estimate_g; mu(u), covariance_g + V(u)) [n], V the emulator's
+        variance.
 
-def state_of(
+        Bayarri et al. (2009) and Higdon et al. (2008) with the discrepancy's covariance integrated
+        out over nodes.
+        """
+        densities = log_sum_exp(node_log_densities(self, u))
+        return densities + log_success(self.success, u) - _wall(self, u)
+
+    def second_moment(self, u: np.ndarray, spread: np.ndarray | None) -> np.ndarray:
+        """log E[L(u)^2], the expectation over means that vary with variance `spread` [n, ..., k].
+
+        `spread` is the emulator's variance V (None), or that part of it which further simulations
+        will resolve: N(z; m, S)^2 integrates over m ~ N(mu, T), S = C + V - T, to
+        |4 pi S|^(-1/2) N(z; mu, S / 2 + T) (Surer et al. 2024). E[L^2] / E[L]^2 is taken from the
+        node of largest weight at u."""
+        k = len(self.used)
+        mean, total = scores(self, u)
+        terms = node_log_densities(self, u)
+        loudest = np.argmax(terms, axis=1)
+        varying = total if spread is None else spread[..., :k]
+        ones = [1] * (varying.ndim - 2)  # axes of `spread` beside n and k
+        left = (self.estimate[loudest] - mean).reshape(len(u), *ones, k)
+        covariance = self.covariance[loudest]
+        if self.size is not None:
+            factor = _noise_factor(self, self.size, u)[np.arange(len(u)), loudest]
+            covariance = factor[:, None, None] * covariance
+        covariance = covariance.reshape(len(u), *ones, k, k)
+        total = total.reshape(left.shape)
+        log_det, square = eliminate(_with_variances(covariance, total), left)
+        rest = _with_variances(covariance, total - varying)
+        of_rest = eliminate(rest, np.zeros(k))[0]
+        log_det_both, square_both = eliminate(_with_variances(rest / 2.0, varying), left)
+        # log N(z; mu, S / 2 + T) - log |4 pi S| / 2 - 2 log N(z; mu, C + V)
+        excess = log_det - 0.5 * (log_det_both + of_rest) + square - 0.5 * square_both
+        both = 2.0 * (log_sum_exp(terms) + log_success(self.success, u) - _wall(self, u))
+        return both.reshape(left.shape[:-1]) + excess - 0.5 * k * np.log(2.0)
+
+
+def likelihood_of(
     emulator: Emulator, reduced: Reduced, box: tuple[np.ndarray, np.ndarray] | None = None
-) -> SignalState:
-    """The state of the components in use."""
+) -> SignalLikelihood:
+    """That of the components in use."""
     used, d = emulator.basis.used, emulator.gp.data.u.shape[1]
-    state = SignalState(
+    state = SignalLikelihood(
         emulator.gp.only(slice(used)),
         np.ones(used),
         reduced.estimate[:, :used],
@@ -75,19 +114,8 @@ def state_of(
     return state._replace(unexplained=reduced.unexplained, **sized)
 
 
-def log_likelihood(state: SignalState, u: Any) -> Any:
-    """log P(success) sum_g w_g N(estimate_g; mu(u), covariance_g + V(u)) [n], V the emulator's
-    variance.
-
-    Bayarri et al. (2009) and Higdon et al. (2008) with the discrepancy's covariance integrated
-    out over nodes.
-    """
-    densities = log_sum_exp(node_log_densities(state, u))
-    return densities + log_success(state.success, u) - _wall(state, u)
-
-
-def node_log_densities(state: SignalState, u: Any) -> Any:
-    """The terms [n, g] of `log_likelihood`'s sum."""
+def node_log_densities(state: SignalLikelihood, u: Any) -> Any:
+    """The terms [n, g] of the likelihood's sum."""
     mean, variance = scores(state, u)
     of_noise, log_weight = state.covariance, state.log_weight
     if state.size is not None:
@@ -102,7 +130,7 @@ def node_log_densities(state: SignalState, u: Any) -> Any:
     return log_weight - 0.5 * (constant + log_det + square)
 
 
-def _noise_factor(state: SignalState, size: Size, u: Any) -> Any:
+def _noise_factor(state: SignalLikelihood, size: Size, u: Any) -> Any:
     """The variance of all noise at u over that at size 1 of the run-to-run noise, [n, g].
 
     Exact where a node has no other noise, or next to no run-to-run noise; between the two, all of
@@ -112,48 +140,17 @@ def _noise_factor(state: SignalState, size: Size, u: Any) -> Any:
     return 1.0 + state.share * (spread[:, None] - 1.0)
 
 
-def scores(state: SignalState, u: Any) -> tuple[Any, Any]:
+def scores(state: SignalLikelihood, u: Any) -> tuple[Any, Any]:
     """Means and variances [n, k] of the scores at u; outside of the box, those at its end."""
     mean, variance = predict(state.gp, namespace(u).clip(u, state.low, state.high))
     return mean.T * state.used, variance.T * state.used * state.doubt
 
 
-def _wall(state: SignalState, u: Any) -> Any:
+def _wall(state: SignalLikelihood, u: Any) -> Any:
     """Penalty of the log likelihood outside of the box, Gaussian: gradients can climb it."""
     xp = namespace(u)
     outside = xp.maximum(state.low - u, 0.0) + xp.maximum(u - state.high, 0.0)
     return 0.5 * xp.sum((outside / WALL) ** 2, axis=-1)
-
-
-def log_second_moment(state: SignalState, u: np.ndarray, spread: np.ndarray | None) -> np.ndarray:
-    """log E[L(u)^2], the expectation over means that vary with variance `spread` [n, ..., k].
-
-    `spread` is the emulator's variance V (None), or that part of it which further simulations
-    will resolve: N(z; m, S)^2 integrates over m ~ N(mu, T), S = C + V - T, to
-    |4 pi S|^(-1/2) N(z; mu, S / 2 + T) (Surer et al. 2024). E[L^2] / E[L]^2 is taken from the
-    node of largest weight at u.
-    """
-    k = len(state.used)
-    mean, total = scores(state, u)
-    terms = node_log_densities(state, u)
-    loudest = np.argmax(terms, axis=1)
-    varying = total if spread is None else spread[..., :k]
-    ones = [1] * (varying.ndim - 2)  # axes of `spread` beside n and k
-    left = (state.estimate[loudest] - mean).reshape(len(u), *ones, k)
-    covariance = state.covariance[loudest]
-    if state.size is not None:
-        factor = _noise_factor(state, state.size, u)[np.arange(len(u)), loudest]
-        covariance = factor[:, None, None] * covariance
-    covariance = covariance.reshape(len(u), *ones, k, k)
-    total = total.reshape(left.shape)
-    log_det, square = eliminate(_with_variances(covariance, total), left)
-    rest = _with_variances(covariance, total - varying)
-    of_rest = eliminate(rest, np.zeros(k))[0]
-    log_det_both, square_both = eliminate(_with_variances(rest / 2.0, varying), left)
-    # log N(z; mu, S / 2 + T) - log |4 pi S| / 2 - 2 log N(z; mu, C + V)
-    excess = log_det - 0.5 * (log_det_both + of_rest) + square - 0.5 * square_both
-    both = 2.0 * (log_sum_exp(terms) + log_success(state.success, u) - _wall(state, u))
-    return both.reshape(left.shape[:-1]) + excess - 0.5 * k * np.log(2.0)
 
 
 def _with_variances(covariance: Any, variance: Any) -> Any:

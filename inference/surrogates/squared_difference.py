@@ -11,6 +11,8 @@ from ..simulations.failures import Failure, incomparable, raised
 from ..types import Discrepancy
 from .output_vectors import MIN_SERIES
 
+MIN_FREEDOM = 3  # numbers more than parameters, from which the size of the noise can be told
+
 
 def squared_difference(time: ArrayLike | None = None) -> Discrepancy:
     """Integrated squared difference, summed over channels.
@@ -45,6 +47,21 @@ def _integrated(grid: np.ndarray | None, observed: np.ndarray, simulated: np.nda
     used = weights > 0
     with np.errstate(all="ignore"):  # of a run that blew up
         return float(np.sum(weights[used] * (observed[used] - simulated[used]) ** 2))
+
+
+def sum_of_squares(observed: np.ndarray, simulated: np.ndarray) -> float:
+    """Sum of squared differences, missing samples left out.
+
+    Raises:
+        ValueError: shapes differ.
+    """
+    if observed.shape != simulated.shape:
+        raise ValueError(
+            f"expected an output of shape {observed.shape}, as observed, got {simulated.shape}"
+        )
+    there = np.isfinite(observed)
+    with np.errstate(all="ignore"):  # of a run that blew up
+        return float(np.sum((observed[there] - simulated[there]) ** 2))
 
 
 def trapezoid_weights(present: np.ndarray, time: np.ndarray | None) -> np.ndarray:

@@ -13,8 +13,8 @@ from .success import log_success
 from .transform import Transform
 
 
-class ThresholdState(NamedTuple):
-    """Arrays on which the likelihood depends; threshold in the standardised units of the GP."""
+class ThresholdLikelihood(NamedTuple):
+    """The likelihood; its threshold in the standardised units of the GP."""
 
     gp: GP  # one process
     threshold: np.ndarray  # []
@@ -22,6 +22,47 @@ class ThresholdState(NamedTuple):
     resolution: np.ndarray  # [], sd of the latent mean from which doubt counts against a place
     success: GP | None = None  # see `success.learn_success`
     doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts
+
+    def __call__(self, u: Any) -> Any:
+        """log P(success) Phi((eps - mu(u)) / sigma(u)) at u [n, d], sigma^2 the variance of a new
+        discrepancy, and of the threshold where it has a width.
+
+        Where the latent variance v is small beside resolution^2, that is the paper's. Where it is
+        large, nothing was learned, and ignorance shall not count as agreement: sigma^2 has no more
+        of v than v / (1 + v / resolution^2), and the root of the rest is added to mu.
+
+        Gutmann and Corander (2016), eq. for Gaussian-process surrogates; Lopez-Guevara et al.
+        (2018), inference.
+        """
+        z, _, _ = self._standardised(u)
+        return log_ndtr(z[:, 0]) + log_success(self.success, u)
+
+    def second_moment(self, u: np.ndarray, spread: np.ndarray | None) -> np.ndarray:
+        """log E[L(u)^2], over a latent mean that varies with variance `spread` [n, ..., k].
+
+        `spread` is the latent variance now (None), which gives the second moment of the unknown
+        likelihood (Jarvenpaa et al. 2019, MaxVar), or that part of it which further simulations
+        will resolve (their expected integrated variance). Both are the chance that two variables
+        of correlation r = spread / sigma^2 lie below z: Phi(z) - 2 T(z, sqrt((1 - r) / (1 + r))),
+        T Owen's; where that cancels, which takes a small r,
+        E_w[Phi((z + sqrt(r) w) / sqrt(1 - r))^2] by Gauss and Hermite about the integrand's peak.
+        """
+        z, noisy, latent = self._standardised(u)
+        varying = latent if spread is None else spread
+        shape = len(u), *[1] * (varying.ndim - 2), z.shape[1]
+        r = np.clip(varying / noisy.reshape(shape), 1e-12, 1.0 - 1e-6)
+        z = np.broadcast_to(z.reshape(shape), r.shape)
+        return log_both_below(z, r)[..., 0] + 2.0 * log_success(self.success, u).reshape(shape[:-1])
+
+    def _standardised(self, u: Any) -> tuple[Any, Any, Any]:
+        """(eps - mu) / sigma, sigma^2, and the part of it that is latent, [n, k] each."""
+        xp = namespace(u)
+        mean, variance = predict(self.gp, u)
+        variance = self.doubt * variance.T
+        latent = variance / (1.0 + variance / self.resolution**2)
+        doubt = variance / xp.sqrt(self.resolution**2 + variance)
+        noisy = latent + xp.exp(2.0 * self.gp.hyper.log_noise) + self.width**2
+        return (self.threshold - mean.T - doubt) / xp.sqrt(noisy), noisy, latent
 
 
 class Quantile(NamedTuple):
@@ -53,52 +94,6 @@ EXCESSES = np.geomspace(1e-8, 1e4, 400)  # over the least discrepancy, in units 
 LOG_LIKELIHOOD_VARIANCE = 0.5  # of one error, where the discrepancy is minus a log likelihood
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(48)
 MIN_EXACT_SHARE = 1e-6  # of Phi(z), below which the difference with Owen's T has lost its digits
-
-
-def log_likelihood(state: ThresholdState, u: Any) -> Any:
-    """log P(success) Phi((eps - mu(u)) / sigma(u)) at u [n, d], sigma^2 the variance of a new
-    discrepancy, and of the threshold where it has a width.
-
-    Where the latent variance v is small beside resolution^2, that is the paper's. Where it is
-    large, nothing was learned, and ignorance shall not count as agreement: sigma^2 has no more of
-    v than v / (1 + v / resolution^2), and the root of the rest is added to mu.
-
-    Gutmann and Corander (2016), eq. for Gaussian-process surrogates; Lopez-Guevara et al.
-    (2018), inference.
-    """
-    z, _, _ = _standardised(state, u)
-    return log_ndtr(z[:, 0]) + log_success(state.success, u)
-
-
-def _standardised(state: ThresholdState, u: Any) -> tuple[Any, Any, Any]:
-    """(eps - mu) / sigma, sigma^2, and the part of it that is latent, [n, k] each."""
-    xp = namespace(u)
-    mean, variance = predict(state.gp, u)
-    variance = state.doubt * variance.T
-    latent = variance / (1.0 + variance / state.resolution**2)
-    doubt = variance / xp.sqrt(state.resolution**2 + variance)
-    noisy = latent + xp.exp(2.0 * state.gp.hyper.log_noise) + state.width**2
-    return (state.threshold - mean.T - doubt) / xp.sqrt(noisy), noisy, latent
-
-
-def log_second_moment(
-    state: ThresholdState, u: np.ndarray, spread: np.ndarray | None
-) -> np.ndarray:
-    """log E[L(u)^2], over a latent mean that varies with variance `spread` [n, ..., k].
-
-    `spread` is the latent variance now (None), which gives the second moment of the unknown
-    likelihood (Jarvenpaa et al. 2019, MaxVar), or that part of it which further simulations
-    will resolve (their expected integrated variance). Both are the chance that two variables
-    of correlation r = spread / sigma^2 lie below z: Phi(z) - 2 T(z, sqrt((1 - r) / (1 + r))),
-    T Owen's; where that cancels, which takes a small r,
-    E_w[Phi((z + sqrt(r) w) / sqrt(1 - r))^2] by Gauss and Hermite about the integrand's peak.
-    """
-    z, noisy, latent = _standardised(state, u)
-    varying = latent if spread is None else spread
-    shape = len(u), *[1] * (varying.ndim - 2), z.shape[1]
-    r = np.clip(varying / noisy.reshape(shape), 1e-12, 1.0 - 1e-6)
-    z = np.broadcast_to(z.reshape(shape), r.shape)
-    return log_both_below(z, r)[..., 0] + 2.0 * log_success(state.success, u).reshape(shape[:-1])
 
 
 def log_both_below(z: np.ndarray, r: np.ndarray) -> np.ndarray:

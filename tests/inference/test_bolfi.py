@@ -261,7 +261,6 @@ def test_bad_calls_are_refused(prior, observed):
     outside = {"slope": [0.1, 5.0, 0.2, -7.0], "offset": [0.5] * 4}
     for use in (
         lambda: engine.tell(outside, np.zeros((4, 30))),
-        lambda: inference.regress(prior, outside, np.arange(4.0)),
         lambda: inference.emulate(prior, outside, np.zeros((4, 2)), np.ones(2)),
     ):
         with pytest.raises(

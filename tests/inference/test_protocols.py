@@ -1,4 +1,5 @@
-"""Every exported rule, family, noise, check and pipeline is found by itself and keeps its protocol.
+"""Every exported rule, family, noise, check and pipeline is found by itself; noises, checks and
+pipelines keep their protocols, as surrogates and rules do in `tests/extensions`.
 
 Kinds are told by what a class or function takes, not by a list of names: what is exported and of
 a kind, but has no case here, fails.
@@ -12,10 +13,6 @@ import jax
 import numpy as np
 import pytest
 from bolfi_liquids.inference.acquisition.rules import RULES
-from bolfi_liquids.inference.gp.process import predict
-from bolfi_liquids.inference.sampling.nuts import padded_state
-from bolfi_liquids.inference.sobol import sobol
-from bolfi_liquids.inference.surrogates import base
 from bolfi_liquids.inference.surrogates.families import FAMILIES, resolve
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 
@@ -26,9 +23,6 @@ pytestmark = pytest.mark.filterwarnings(
     "ignore::bolfi_liquids.inference.SamplingWarning",  # of a handful of draws
 )
 
-RUNS = 12
-KEYS = [jax.random.key(0), jax.random.key(1)]
-POINTS = np.array([[0.2, 0.7], [0.5, 0.5], [0.9, 0.1]])
 FACES = (inference, inference.surrogates, inference.checks, inference.criticism)
 LAYOUT = Layout(np.tile([0, 1], 8), np.repeat(np.arange(8), 2))  # two channels of 8 samples
 
@@ -51,7 +45,7 @@ def is_rule(one):
 
 
 def is_family(one):
-    return inspect.isclass(one) and hasattr(one, "learner")
+    return inspect.isclass(one) and hasattr(one, "learn")
 
 
 def is_noise(one):
@@ -138,168 +132,8 @@ def test_a_new_rule_without_a_name_is_noticed(monkeypatch):
     assert set(exported(is_rule).values()) != set(RULES.values())
 
 
-# Surrogates, of every family.
-
-
-@pytest.fixture(scope="module", params=FAMILIES)
-def learned(request, simulate, prior, observed):
-    """The surrogate of a fit, by family."""
-    u = sobol(0, 0, RUNS, len(prior))
-    signals = simulate(prior.from_unit(u), range(RUNS))
-    data: np.ndarray | None = observed
-    if request.param == "log_likelihood":
-        signals, data = -0.5 * np.sum((signals - observed) ** 2, 1) / 0.05**2, None
-    engine = inference.Bolfi(prior, data, surrogate=FAMILIES[request.param]())
-    engine.tell(prior.from_unit(u), signals, range(RUNS))
-    return engine.fit().learned
-
-
 def finite(values):
     return bool(np.isfinite(np.asarray(values, float)).all())
-
-
-def same(a, b):
-    return all(np.array_equal(x, y) for x, y in zip(*map(jax.tree.leaves, (a, b)), strict=True))
-
-
-def check_gp(of):
-    assert of.gp.data.u.shape == (RUNS, 2)
-
-
-def check_state(of):
-    """Arrays alone, of float64, `gp` among them."""
-    leaves = jax.tree.leaves(of.state)
-    assert leaves and all(isinstance(leaf, np.ndarray) for leaf in leaves)
-    kinds = {np.asarray(leaf).dtype.kind for leaf in leaves}
-    assert all(leaf.dtype == np.float64 for leaf in leaves if leaf.dtype.kind == "f"), kinds
-    for one, other in zip(predict(of.state.gp, POINTS), predict(of.gp, POINTS), strict=True):
-        np.testing.assert_allclose(one, other[: len(one)], rtol=1e-9)
-    padded = of.log_likelihood(padded_state(of.state), POINTS)
-    np.testing.assert_allclose(padded, of.log_likelihood(of.state, POINTS), rtol=1e-9)
-
-
-def densities(of):
-    first = of.log_likelihood(of.state, POINTS)
-    return first, of.log_second_moment(of.state, POINTS, None)
-
-
-def check_log_likelihood(of):
-    values = densities(of)[0]
-    assert values.shape == (3,) and values.dtype == np.float64 and finite(values)
-    assert np.ptp(values) > 0.0
-    with jax.enable_x64(True):  # NUTS evaluates the same function by JAX
-        traced = jax.jit(of.log_likelihood)(padded_state(of.state), POINTS)
-    np.testing.assert_allclose(traced, values, rtol=1e-9)
-
-
-def check_log_second_moment(of):
-    """E[L^2] >= E[L]^2, up to quadrature."""
-    first, second = densities(of)
-    assert second.shape == (3,) and finite(second)
-    assert (second > 2.0 * first - 1e-3).all()
-
-
-def check_success(of):
-    assert of.success is None  # no run failed
-
-
-def check_cautious(of):
-    """Doubt makes no place more probable to it."""
-    first, cautious = (one.log_likelihood(one.state, POINTS) for one in (of, of.cautious))
-    assert finite(cautious) and (cautious <= first + 1e-9).all()
-
-
-def check_sure(of):
-    """Where nothing is doubted, no more than where something is."""
-    assert finite(of.log_likelihood(of.sure, POINTS))
-
-
-def check_minimum(of):
-    best = of.minimum()
-    assert best.shape == (2,) and ((best >= 0.0) & (best <= 1.0)).all()
-    np.testing.assert_array_equal(best, of.minimum())
-
-
-def check_fantasize(of):
-    """Its own predictions teach it nothing new but certainty."""
-    after = of.fantasize(POINTS[:2])
-    np.testing.assert_allclose(after.predict(POINTS)[0], of.predict(POINTS)[0], atol=1e-6)
-    assert (after.predict(POINTS)[1] <= of.predict(POINTS)[1] + 1e-9).all()
-    assert len(after.gp.data.u) == RUNS + 2 and len(of.gp.data.u) == RUNS
-    checks = after.checks()
-    assert {len(found) for found in checks.values()} == {
-        RUNS
-    } and checks.keys() == of.checks().keys()
-    assert isinstance(after.warnings(), list)
-
-
-def check_predict(of):
-    mean, sd = of.predict(POINTS)
-    assert mean.shape == sd.shape and len(mean) == 3
-    assert mean.dtype == sd.dtype == np.float64
-    assert finite(mean) and finite(sd) and (sd > 0.0).all()
-
-
-def check_predicted(of):
-    """What three runs would be if they came out as predicted, in the units of `predict`."""
-    size = of.output.layout.channel.size if hasattr(of, "output") else 1
-    made = of.predicted(np.ones((3, size)), np.array([1.0, 2.0, 3.0]))
-    assert made.shape == of.predict(POINTS)[0].shape and finite(made)
-
-
-def check_constants(of):
-    assert of.constants()
-    assert all(finite(value) for value in of.constants().values())
-
-
-def check_checks(of):
-    z = of.checks()["loo_z"]
-    assert len(z) == RUNS and finite(z)
-
-
-def check_fits(of):
-    assert isinstance(of.fits, bool)
-
-
-def check_described(of):
-    assert all(isinstance(said, str) and said for said in of.described())
-
-
-def check_warnings(of):
-    assert isinstance(of.warnings(), list) and isinstance(of.warnings(confirmed=True), list)
-    assert all(isinstance(said, str) and said for said in of.warnings())
-
-
-def check_predictive(of):
-    first, again, other = (of.predictive(np.random.default_rng(seed), POINTS) for seed in (0, 0, 1))
-    assert first
-    for name, values in first.items():
-        assert len(values) == 3 and finite(values)
-        np.testing.assert_array_equal(values, again[name])
-        assert not np.array_equal(values, other[name])
-
-
-MEMBERS = [name for name in vars(base.Surrogate) if not name.startswith("_")]
-
-
-@pytest.mark.parametrize("member", MEMBERS)
-def test_a_surrogate_keeps_its_protocol(learned, member):
-    """A member without a check fails here."""
-    globals()[f"check_{member}"](learned)
-
-
-# Acquisitions.
-
-
-@pytest.mark.parametrize("name", RULES)
-def test_a_rule_keeps_its_protocol(learned, name):
-    rule, before = RULES[name](), jax.tree.leaves(learned.gp)
-    u = rule(KEYS[0], learned, 2)
-    assert isinstance(u, np.ndarray) and u.shape == (2, 2) and u.dtype == np.float64
-    assert ((u > 0.0) & (u < 1.0)).all() and (u[0] != u[1]).any()
-    np.testing.assert_array_equal(u, RULES[name]()(KEYS[0], learned, 2))
-    assert not np.array_equal(u, rule(KEYS[1], learned, 2))
-    assert same(before, jax.tree.leaves(learned.gp))  # it chooses, and changes nothing
 
 
 # Noises.

@@ -197,10 +197,10 @@ def test_noise_that_repeated_runs_do_not_show_is_doubt():
 
     options = {"budget": 16, "noise": 0.3, "warn": False, "progress": False}
     fit = inference.fit(simulate, prior, observed, **options)
-    latent = fit.learned.state._replace(doubt=np.zeros(()))
+    latent = fit.learned.log_likelihood._replace(doubt=np.zeros(()))
     gap = [
-        np.ptp(fit.learned.log_likelihood(state, prior.to_unit({"w": np.array([2.3, 3.0])})))
-        for state in (latent, fit.learned.sure)
+        np.ptp(likelihood(prior.to_unit({"w": np.array([2.3, 3.0])})))
+        for likelihood in (latent, fit.learned.sure)
     ]
     assert gap[1] > 2.0 * gap[0]
     assert fit.status == "not confirmed"

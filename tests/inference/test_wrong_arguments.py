@@ -26,8 +26,8 @@ pytestmark = [
 ]
 matplotlib.use("agg")
 
-MADE_BY_THE_ENGINE = {"Emulation", "Fit", "Regression"}  # whose constructors are not for users
-CALLED_BY_THE_ENGINE = {"learner"}
+MADE_BY_THE_ENGINE = {"Emulation", "Fit"}  # whose constructors are not for users
+CALLED_BY_THE_ENGINE = {"learn", "measure", "observe", "search", "view"}
 OBSERVED = np.linspace(0.0, 1.0, 30)
 THETA = {"a": np.linspace(0.1, 0.9, 9)}
 CALLS = []
@@ -57,7 +57,6 @@ def cases():
     signals = simulate(THETA, range(9))
     engine.tell(THETA, signals)
     fit = engine.fit()
-    regression = inference.regress(prior, THETA, THETA["a"] ** 2)
     bank = inference.SimulationBank()
     bank.put("", {"a": 0.5}, 0, Simulation(signals[0], None, 0.0))
     of_fit = {"simulate": simulate, "prior": prior, "observed": OBSERVED}
@@ -91,8 +90,6 @@ def cases():
         "Prior.contains": (prior.contains, {"theta": THETA}),
         "Prior.log_prob": (prior.log_prob, {"theta": THETA}),
         "Prior.sample": (prior.sample, {"key": jax.random.key(0), "n": 2}),
-        "regress": (inference.regress, {"prior": prior, "theta": THETA, "values": THETA["a"]}),
-        "Regression.predict": (regression.predict, {"theta": THETA}),
         "emulate": (
             inference.emulate,
             {

@@ -26,7 +26,7 @@ def history(outputs, theta=DRAWN):
 def before(sd):
     """Outputs of 0 and of this sd are predicted everywhere."""
     learned = SimpleNamespace(
-        gp=SimpleNamespace(data=SimpleNamespace(u=np.zeros((KNOWN, 1)))),
+        u=np.zeros((KNOWN, 1)),
         predicted=lambda features, discrepancy: features,
         predict=lambda u: (np.zeros((len(u), 2)), np.tile(np.array(sd, float), (len(u), 1))),
     )

@@ -12,6 +12,7 @@ from bolfi_liquids.inference.sampling import draw as sampling
 from bolfi_liquids.inference.sampling import nuts, quadrature
 from bolfi_liquids.inference.sampling.convergence import ConvergenceStatus, limits
 from bolfi_liquids.inference.sampling.target import Chains, Length, Target
+from jax.tree_util import Partial
 from scipy.stats import norm
 
 from bolfi_liquids import inference
@@ -36,9 +37,8 @@ def peaks(state, u):
 
 def one(centre, whitener, bend=0.0):
     """A single Gaussian; one likelihood for all tests saves compiling others."""
-    return Target(
-        peaks, (np.stack([centre] * 2), np.stack([whitener] * 2), np.asarray(bend)), len(centre)
-    )
+    state = np.stack([centre] * 2), np.stack([whitener] * 2), np.asarray(bend)
+    return Target(Partial(peaks, state), len(centre))
 
 
 def gaussian(d, sd=0.03):
@@ -51,7 +51,8 @@ def gaussian(d, sd=0.03):
 def bimodal(d, sd=0.03):
     """Modes 17 sd apart in each parameter."""
     centres = np.stack([np.full(d, 0.25), np.full(d, 0.75)])
-    return Target(peaks, (centres, np.stack([np.eye(d) / sd] * 2), np.asarray(0.0)), d)
+    state = centres, np.stack([np.eye(d) / sd] * 2), np.asarray(0.0)
+    return Target(Partial(peaks, state), d)
 
 
 def banana():
@@ -138,12 +139,12 @@ def test_compiles_once_for_all_fits_and_lengths(line_fit, prior, observed, simul
     def counted(state, u):
         if not isinstance(u, np.ndarray):  # NumPy evaluates it without compiling
             traces.append(None)
-        return line_fit.learned.log_likelihood(state, u)
+        return state(u)
 
     counts = []
     short = inference.fit(simulate, prior, observed, budget=7, surrogate="discrepancy", warn=False)
     for fit, draws in ((short, 30), (line_fit, 30), (line_fit, 400)):  # data and padding differ
-        target = Target(counted, fit.learned.state, 2)
+        target = Target(Partial(counted, fit.learned.log_likelihood), 2)
         source = in_float64(nuts.sample_nuts)(
             np.random.default_rng(0), target, Length(4, 20, draws)
         )
@@ -244,7 +245,7 @@ def test_a_likelihood_that_is_nowhere_finite_is_an_error(sampler):
 def test_a_hole_in_the_likelihood_is_avoided_or_told():
     """NaN wherever u_1 < 0.45: half of the Gaussian remains, which emcee samples; trajectories
     break off at the edge, which NUTS must say."""
-    target = Target(right_half, uncorrelated().state, 2)
+    target = Target(Partial(right_half, *uncorrelated().log_likelihood.args), 2)
     made = sample("emcee", target)
     assert not made.found
     assert_means(made.chains.u, [0.45 + 0.03 * np.sqrt(2.0 / np.pi), 0.45])
@@ -278,7 +279,7 @@ def test_a_fit_agrees_with_its_quadrature(line_fit, sampler):
     posterior = tree["posterior"]
     u = line_fit.prior.to_unit({n: posterior[n].to_numpy().ravel() for n in line_fit.prior.names})
     learned = line_fit.learned
-    cells = in_float64(quadrature.integrate)(Target(learned.log_likelihood, learned.state, 2))
+    cells = in_float64(quadrature.integrate)(Target(learned.log_likelihood, 2))
     assert quadrature.total_variation(u, cells) < 0.05
     assert_means(u.reshape(4, 1000, 2), cells.mass @ (cells.low + 0.5 * cells.width[:, None]))
     assert posterior.attrs["status"] == ConvergenceStatus.CONVERGED

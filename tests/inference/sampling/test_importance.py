@@ -1,5 +1,7 @@
 """The weighted population against posteriors whose moments and evidence are known."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from bolfi_liquids.inference.sampling.importance import explore
@@ -33,7 +35,7 @@ def bimodal_state(d, sd):
 
 
 def explored(seed, state, d):
-    return explore(np.random.default_rng(seed), Target(two_gaussians, state, d))
+    return explore(np.random.default_rng(seed), Target(partial(two_gaussians, state), d))
 
 
 def populations(state, d):

@@ -10,7 +10,14 @@ import numpy as np
 import pytest
 import xarray as xr
 from bolfi_liquids.inference import SimulationBank
-from bolfi_liquids.inference.simulations import Compute, Job, OneByOne, Simulation, run_missing
+from bolfi_liquids.inference.simulations import (
+    Batched,
+    Compute,
+    Job,
+    OneByOne,
+    Simulation,
+    run_missing,
+)
 from bolfi_liquids.inference.simulations.failures import timed_out
 from bolfi_liquids.inference.simulations.job import run_batch, simulation_seed
 
@@ -124,7 +131,11 @@ class Patient:
 def test_a_simulator_that_stops_itself_stays_in_its_thread(seconds, error):
     patient = Patient(seconds)
     with SimulationBank() as bank:
-        (found,) = run_missing(patient.simulate, JOBS[:1], Compute(bank=bank, timeout=0.1))
+        (found,) = run_missing(
+            Batched(patient.simulate, time_limit=patient.time_limit),
+            JOBS[:1],
+            Compute(bank=bank, timeout=0.1),
+        )
     assert found.error == error
     assert patient.threads == {threading.current_thread()}
 
@@ -141,7 +152,7 @@ def test_a_simulator_of_single_runs_stops_itself_as_well(seconds, error):
     patient = PatientOnce(seconds)
     with SimulationBank() as bank:
         keep = Compute(bank=bank, timeout=0.1)
-        (found,) = run_missing(OneByOne(patient.simulate), JOBS[:1], keep)
+        (found,) = run_missing(OneByOne(patient.simulate, patient.time_limit), JOBS[:1], keep)
     assert found.error == error
     assert patient.threads == {threading.current_thread()}
 

@@ -8,14 +8,12 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
-from bolfi_liquids.inference.simulations import Compute, Job, run_missing
+from bolfi_liquids.inference.simulations import Batched, Compute, Job, run_missing
 from bolfi_liquids.inference.simulations.job import run_batch
 
 
 class Marching:
     """Signals are the seed, and how many were simulated in the same call."""
-
-    together = 4
 
     def __init__(self, fails=None):
         self.fails = fails
@@ -29,7 +27,8 @@ class Marching:
 def run(simulator, count, pool):
     jobs = [Job({"a": 1.0}, seed) for seed in range(count)]
     with SimulationBank() as bank:
-        found = run_missing(simulator.simulate, jobs, Compute(bank=bank, executor=pool), (2,))
+        compute = Compute(bank=bank, executor=pool)
+        found = run_missing(Batched(simulator.simulate, 4), jobs, compute, (2,))
         assert len(bank) == count
     return found
 
@@ -52,18 +51,14 @@ def test_a_run_that_fails_costs_only_itself():
 
 @pytest.mark.parametrize("together", [0, 2.5, "four"])
 def test_what_is_no_number_of_simulations_is_refused(together):
-    simulator = Marching()
-    simulator.together = together
-    with ThreadPoolExecutor(2) as pool, pytest.raises(ValueError, match="`together`"):
-        run(simulator, 4, pool)
+    with pytest.raises(ValueError, match="together"):
+        Batched(Marching().simulate, together)
 
 
 @pytest.mark.parametrize("neutral", [3, "drag", ["drag"]])
 def test_neutral_values_without_names_are_refused(neutral):
-    simulator = Marching()
-    simulator.neutral = neutral
-    with ThreadPoolExecutor(2) as pool, pytest.raises(ValueError, match="`neutral`"):
-        run(simulator, 4, pool)
+    with pytest.raises(ValueError, match="neutral"):
+        Batched(Marching().simulate, neutral=neutral)
 
 
 def test_a_call_may_take_as_many_times_as_long_as_it_makes_simulations():
@@ -75,14 +70,14 @@ def test_a_call_may_take_as_many_times_as_long_as_it_makes_simulations():
         time.sleep(0.25 * len(seeds))
         return seeds[:, None].astype(float)
 
-    sleepy.together = 4
+    four = Batched(sleepy, 4)
     jobs = [Job({"a": 1.0}, seed) for seed in range(4)]
     with SimulationBank() as bank, ThreadPoolExecutor(1) as pool:
         kept = Compute(bank=bank, executor=pool, timeout=0.6)
-        assert all(one.error is None for one in run_missing(sleepy, jobs, kept, (1,)))
+        assert all(one.error is None for one in run_missing(four, jobs, kept, (1,)))
         assert calls == [4]
         kept = Compute(bank=bank, executor=pool, timeout=0.05)
-        late = run_missing(sleepy, jobs, kept, (1,), identity="short")
+        late = run_missing(four, jobs, kept, (1,), identity="short")
         assert all("no signal after" in one.error.text for one in late)
         assert calls == [4, 4, 1, 1, 1, 1]
 
@@ -92,8 +87,6 @@ import os
 import numpy as np
 
 class Mortal:
-    together = 4
-
     def __init__(self, made, mended):
         self.made, self.mended = made, mended
 
@@ -113,7 +106,7 @@ def test_a_worker_that_is_killed_loses_its_call_and_what_was_stored_is_not_repea
     (tmp_path / "mortal.py").write_text(MORTAL)
     monkeypatch.syspath_prepend(tmp_path)
     made, mended = tmp_path / "made", tmp_path / "mended"
-    simulate = importlib.import_module("mortal").Mortal(str(made), str(mended))
+    simulate = Batched(importlib.import_module("mortal").Mortal(str(made), str(mended)), 4)
     jobs = [Job({"a": 1.0}, seed) for seed in range(12)]
 
     def run_all():
@@ -150,8 +143,8 @@ MIXED = [Job({"a": 1.0, "drag": 2.0}, 0), Job({"a": 3.0}, 1), Job({"a": 5.0, "la
 
 def test_runs_of_other_parameters_share_a_call_where_the_simulator_has_their_neutral_values():
     simulator = Told()
-    simulator.neutral = {"drag": 0.0, "lag": -1.0}
-    found = run_batch(simulator.simulate, MIXED, (1,))
+    batched = Batched(simulator.simulate, neutral={"drag": 0.0, "lag": -1.0})
+    found = run_batch(batched, MIXED, (1,))
     assert simulator.calls == [
         {"a": [1.0, 3.0, 5.0], "drag": [2.0, 0.0, 0.0], "lag": [-1.0, -1.0, 1.0]}
     ]

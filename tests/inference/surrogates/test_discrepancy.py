@@ -90,7 +90,7 @@ def test_minimum_and_threshold_agree_with_a_grid():
     mean, sd = fitted.predict(grid)
     noise = fitted.scale.spread * np.exp(float(fitted.gp.hyper.log_noise[0]))
     sure = mean + np.sqrt(sd**2 - noise**2)
-    np.testing.assert_allclose(fitted.minimum(), grid[sure.argmin()], atol=0.011)
+    np.testing.assert_allclose(fitted.best(), grid[sure.argmin()], atol=0.011)
     assert fitted.threshold == pytest.approx(fitted.predict(u)[0].min())
     assert mean.min() < fitted.threshold < mean.min() + sd.min()
 
@@ -129,4 +129,4 @@ def test_a_run_that_blew_up_does_not_drown_the_others():
     values = bowl(u, np.random.default_rng(0), 1.0)
     values[np.argmax(np.abs(u - 0.4).sum(1))] = 1e100
     fitted = learn(u, values)
-    assert np.abs(fitted.minimum() - 0.4).max() < 0.15
+    assert np.abs(fitted.best() - 0.4).max() < 0.15

@@ -4,7 +4,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from bolfi_liquids.inference.surrogates.families import SignalFamily
+from bolfi_liquids.inference.surrogates import SignalFamily
 from bolfi_liquids.inference.surrogates.given_noise import given_noise
 from bolfi_liquids.inference.surrogates.output_vectors import MAX_VALUES, describe
 
@@ -64,11 +64,11 @@ def test_a_long_series_needs_no_matrix():
     """20 000 samples: as a covariance 3 GB."""
     tracemalloc.start()
     try:
-        learner = SignalFamily(noise=0.1).learner(np.zeros(20_000))
+        _, scale = SignalFamily(noise=0.1).view(np.zeros(20_000))
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert learner.scale.given.white.shape == (MAX_VALUES,)
+    assert scale.given.white.shape == (MAX_VALUES,)
     assert peak < 50e6
 
 
@@ -92,6 +92,6 @@ def test_other_noise_is_refused(prior, gappy, noise, message):
 def test_noise_that_reads_two_ways_is_refused(prior):
     observed = np.array([[1.0, np.nan], [np.nan, 2.0]])
     with pytest.raises(ValueError, match="may be sds or a covariance"):
-        SignalFamily(noise=np.full((2, 2), 0.1)).learner(observed)
-    given = SignalFamily(noise=[0.1, 0.1]).learner(observed).scale.given
+        SignalFamily(noise=np.full((2, 2), 0.1)).observe(observed)
+    given = SignalFamily(noise=[0.1, 0.1]).view(observed)[1].given
     np.testing.assert_allclose(given.white, 0.01)

@@ -10,9 +10,8 @@ from bolfi_liquids.inference.gp import process as gp
 from bolfi_liquids.inference.gp.hyperparameters import NOISE
 from bolfi_liquids.inference.gp.process import predict
 from bolfi_liquids.inference.sobol import sobol
+from bolfi_liquids.inference.surrogates import SignalFamily, TrainingData
 from bolfi_liquids.inference.surrogates.emulator import EmulatorLimits, emulate, noise_share
-from bolfi_liquids.inference.surrogates.families import SignalFamily, TrainingData
-from bolfi_liquids.inference.surrogates.signal_likelihood import log_likelihood, log_second_moment
 from bolfi_liquids.inference.surrogates.success import RunOutcomes
 from bolfi_liquids.inference.surrogates.warnings import UNREPEATED
 from scipy.stats import binom, multivariate_normal
@@ -35,15 +34,15 @@ def outputs(u, seeds=None):
 
 
 def learned(u, signals, observed, **options):
-    learner = SignalFamily(**options).learner(observed)
-    measured = learner.measure(signals)
+    family = SignalFamily(**options)
+    measured = family.measure(observed, signals)
     runs = RunOutcomes(u, np.isfinite(measured.discrepancy))
-    known = TrainingData(u, measured.features, measured.discrepancy, None, runs)
-    return learner.learn(known, None)
+    known = TrainingData(observed, u, measured.features, measured.discrepancy, None, runs)
+    return family.learn(known, jax.random.key(0))
 
 
 def posterior(surrogate):
-    values = log_likelihood(surrogate.state, GRID)
+    values = surrogate.log_likelihood(GRID)
     weight = np.exp(values - values.max())
     return weight / weight.sum()
 
@@ -131,9 +130,9 @@ def test_second_moment_agrees_with_sampling():
     draws = mean[:k] + np.sqrt(variance[:k]) * rng.normal(size=(200_000, k))
     node = found.reduced.estimate[0][:k], found.reduced.covariance[0][:k, :k]
     values = np.exp(multivariate_normal(*node).logpdf(draws))
-    second = np.exp(log_second_moment(found.state, point, None))[0]
+    second = np.exp(found.log_likelihood.second_moment(point, None))[0]
     # all of the variance as what further runs may resolve: the same
-    whole = np.exp(log_second_moment(found.state, point, variance[None, None]))
+    whole = np.exp(found.log_likelihood.second_moment(point, variance[None, None]))
     np.testing.assert_allclose(whole, [[second]], rtol=1e-9)
     sample = (values * np.exp(found.reduced.log_weight[0])) ** 2
     assert abs(second - sample.mean()) < 5.0 * sample.std() / np.sqrt(len(sample))
@@ -142,13 +141,13 @@ def test_second_moment_agrees_with_sampling():
 def test_likelihood_and_gradient_are_finite_everywhere(design, noise):
     observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0], [1.0, 1.0], [1e-12, 0.3]])
-    summed = jax.jit(jax.grad(lambda state, u: log_likelihood(state, u).sum(), 1))
+    summed = jax.jit(jax.grad(lambda likelihood, u: likelihood(u).sum(), 1))
     for shift in (0.0, 1e3, 1e8):  # data that no parameter explains
         found = learned(design, outputs(design), observed + shift * TIME, noise=SD)
         with jax.enable_x64(True):
-            gradient = summed(found.state, jnp.asarray(corners))
+            gradient = summed(found.log_likelihood, jnp.asarray(corners))
         assert np.isfinite(gradient).all()
-        assert np.isfinite(log_likelihood(found.state, corners)).all()
+        assert np.isfinite(found.log_likelihood(corners)).all()
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1e6])

@@ -11,7 +11,6 @@ from bolfi_liquids.inference.surrogates.threshold import (
     Matched,
     Predicted,
     log_both_below,
-    log_likelihood,
     matched,
 )
 from bolfi_liquids.inference.surrogates.transform import Transform
@@ -28,7 +27,7 @@ def test_agrees_with_scipy_with_the_noise_in_sigma():
     fitted = with_threshold(learn(U, DELTA, "identity"), Predicted(0.2))
     u = np.array([[0.8, 0.3]])
     mean, sd = fitted.predict(u)
-    value = log_likelihood(fitted.state, u)
+    value = fitted.log_likelihood(u)
     np.testing.assert_allclose(value, norm.logcdf((fitted.threshold - mean[0]) / sd[0]), rtol=1e-6)
 
 
@@ -40,7 +39,7 @@ def test_finite_and_monotone_with_finite_gradients_over_a_hundred_decades():
         values, gradients = jax.jit(
             jax.vmap(
                 lambda eps: jax.value_and_grad(
-                    lambda u: log_likelihood(fitted.state._replace(threshold=eps), u[None])[0]
+                    lambda u: fitted.log_likelihood._replace(threshold=eps)(u[None])[0]
                 )(u)
             )
         )(thresholds)
@@ -118,8 +117,6 @@ def test_doubt_is_no_agreement_to_a_cautious_surrogate_and_what_is_learned_stays
     at = U[U[:, 0] < 0.6]
     fitted = with_threshold(learn(at, 1.0 + 9.0 * ((at - 0.3) ** 2).sum(-1), "identity"), 1.2)
     near, far = np.array([[0.3, 0.3]]), np.array([[1.0, 0.0]])
-    open_, cautious = fitted.state, fitted.cautious.state
-    np.testing.assert_allclose(
-        log_likelihood(cautious, near), log_likelihood(open_, near), atol=0.05
-    )
-    assert log_likelihood(cautious, far) < log_likelihood(open_, far)
+    open_, cautious = fitted.log_likelihood, fitted.cautious.log_likelihood
+    np.testing.assert_allclose(cautious(near), open_(near), atol=0.05)
+    assert cautious(far) < open_(far)

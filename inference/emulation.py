@@ -1,0 +1,72 @@
+"""A vector as a function of parameters, learned from runs that were made before."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ._float64 import in_float64
+from .arguments import checked_array
+from .prior import Prior, check_support, checked_prior
+from .surrogates import emulator as vectors
+from .surrogates.emulator import Emulator, EmulatorLimits
+from .types import Theta
+
+COMPONENTS = 6  # at most; of smooth outputs later ones are noise
+MIN_VALUES = 3  # finite rows from which a process can be learned
+
+
+class Emulation:
+    """Gaussian processes of the principal components of outputs [m]; see `emulate`.
+
+    Attributes:
+        prior: Of the parameters; its quantiles are what the processes know.
+        left_out: What the other runs predict of each run, [n, m].
+        missed: Output of each run less that, [n, m]: the error of the emulation, chance between
+            runs included.
+    """
+
+    def __init__(self, prior: Prior, learned: Emulator):
+        self.prior, self._learned = prior, learned
+        self.left_out = vectors.left_out(learned)
+        self.missed = learned.outputs - self.left_out
+
+    @in_float64
+    def predict(self, theta: Theta) -> np.ndarray:
+        """Mean output [n, m] at theta, name -> [n]; outside the support, at its edge."""
+        return vectors.mean(self._learned, np.atleast_2d(self.prior.to_unit(theta)))
+
+
+@in_float64
+def emulate(prior: Prior, theta: Theta, outputs: ArrayLike, scale: ArrayLike) -> Emulation:
+    """Learn a vector as a function of parameters.
+
+    No simulator is run, nothing is observed and nothing is sampled.
+
+    Args:
+        prior: Gives names, ranges and scales of the parameters.
+        theta: Name -> [n], in the prior's support.
+        outputs: [n, m]; a row that is not finite is left out.
+        scale: [m], positive: differences that count alike.
+
+    Raises:
+        ValueError: shapes disagree, fewer than three finite rows, theta outside the support, or a
+            scale that is not positive.
+    """
+    rows = checked_prior(prior).to_dict(np.atleast_2d(prior.to_array(theta)))
+    known, weights = checked_array("outputs", outputs), checked_array("scale", scale)
+    n = len(next(iter(rows.values())))
+    if known.ndim != 2 or len(known) != n:
+        raise ValueError(f"outputs must have shape ({n}, m), a row per theta, got {known.shape}")
+    finite = np.isfinite(known).all(axis=1)
+    if finite.sum() < MIN_VALUES:
+        raise ValueError(
+            f"outputs must be finite for {MIN_VALUES} theta, got {finite.sum()} of {n}; make more"
+        )
+    check_support(prior, rows)
+    if weights.shape != known.shape[1:] or not (weights > 0.0).all():
+        raise ValueError(
+            f"scale must hold {known.shape[1]} positive numbers, one per output, got shape "
+            f"{weights.shape} and least {weights.min(initial=np.inf)}"
+        )
+    limits, u = EmulatorLimits(COMPONENTS, predicted=None), prior.to_unit(rows)[finite]
+    learned = vectors.emulate(u, known[finite], lambda _: weights, limits, None, prior.normal)
+    return Emulation(prior, learned)
