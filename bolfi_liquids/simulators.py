@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -26,7 +27,7 @@ SAME_DENSITY = 0.02
 """Relative difference up to which two weighings are of one liquid."""
 
 
-class FluidSimulator:
+class FluidSimulator(ABC):
     """Stops itself when its time is over, and is fastest with several simulations in a call.
 
     Attributes:
@@ -35,14 +36,14 @@ class FluidSimulator:
 
     together: ClassVar[int] = 4
 
+    @abstractmethod
     def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """Signals (B, ...) at theta, name -> (B,)."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def identity(self) -> str:
         """A text that two equal simulators share, and no others."""
-        raise NotImplementedError
 
     def time_limit(self, seconds: float) -> AbstractContextManager[None]:
         """Inside, a simulation that takes longer raises TimeoutError."""

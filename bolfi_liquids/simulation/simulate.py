@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from ..models import Cups
 
 RIG_SIZES = (*LENGTHS, *STICK_WEIGHT)  # attributes of a recording that may be replaced
-DISTANCE_LIMITS = -0.5, 0.5  # m, between lip and receiver; more is a slip of the unit
 PATTERN_SPEED = 0.1  # m/s, of a star or circle that is given by its name
 
 
@@ -100,19 +99,16 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     from ..models import StirSetup
 
     targets, effects = check_targets(movie, out), check_effects(effects, "stir")
-    given = DENSITY if density is None else _density(density)
-    # refused before a file is read
-    batch_of(
-        {"viscosity": viscosity, "cohesion": cohesion, "density": given}, effects, particles, seed
-    )
+    weighed = None if density is None else number_of(density, Argument("density"))
     (opened,) = open_recordings(bundled_recording("glycerin") if recording is None else recording)
     if targets.out is not None and targets.out.exists() and targets.out.samefile(opened.path):
         raise InputError(
             "is the recording itself", where=str(targets.out), fix="choose another name"
         )
-    density = opened.number("liquid_density") if density is None else given
-    liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": density}
-    of_another = _with_rig(opened.attrs, rig) | {"liquid_density": density}
+    if weighed is None:
+        weighed = opened.number("liquid_density")
+    liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": weighed}
+    of_another = _with_rig(opened.attrs, rig) | {"liquid_density": weighed}
     plan = _planned(replace(opened, attrs=MappingProxyType(of_another)), path)
     count = particles or StirSetup.from_recording(plan).particles
     batch = batch_of(liquid, effects, count, seed)
@@ -127,10 +123,6 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     if targets.movie is not None:
         film_stir(targets.movie, batch.one, simulator, progress)
     return found
-
-
-def _density(value: Any) -> float:
-    return number_of(value, Argument("density"))
 
 
 def _with_rig(
@@ -255,11 +247,11 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     from ..models import Landings, PourAction
 
     targets = check_targets(movie, out)
-    _check_action(angular_velocity, distance)
-    cups, density = cups_of(cups), _density(density)
+    cups, density = cups_of(cups), number_of(density, Argument("density"))
+    check_distance(number_of(distance, Argument("distance")), cups, Argument("distance"))
+    rate = Argument("angular_velocity")
+    check_rate(number_of(angular_velocity, rate), cups, rate)
     liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": density}
-    check_distance(distance, cups, Argument("distance"))
-    check_rate(angular_velocity, cups, Argument("angular_velocity"))
     batch = batch_of(liquid, check_effects(effects, "pour"), particles, seed)
     targets.check_single(batch.single)
     outcome, particles = LandedParticles(angular_velocity), batch.one.particles
@@ -276,22 +268,3 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     if targets.movie is not None:
         film_pour(targets.movie, batch.one, simulator, action, landings, progress)
     return found
-
-
-def _check_action(angular_velocity: float, distance: float) -> None:
-    from ..models.cups import FASTEST, SLOWEST
-
-    angular_velocity = number_of(angular_velocity, Argument("angular_velocity"))
-    distance = number_of(distance, Argument("distance"))
-    low, high = DISTANCE_LIMITS
-    if not low <= distance <= high:
-        raise InputError(
-            f"{100 * distance:g}", where=Argument("distance"), fix="give it in cm; in Python, in m"
-        )
-    if not SLOWEST <= angular_velocity <= FASTEST:
-        slowest, fastest = np.degrees([SLOWEST, FASTEST])
-        raise InputError(
-            f"{np.degrees(angular_velocity):g}",
-            where=Argument("angular_velocity"),
-            fix=f"give {slowest:.2g} to {fastest:.4g} deg/s; in Python, in rad/s",
-        )
