@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -31,17 +32,17 @@ TOGETHER = 4
 """Simulations that one thread makes at the same time."""
 
 
-class FluidSimulator:
+class FluidSimulator(ABC):
     """Simulations of the fluid, by name of their parameters."""
 
+    @abstractmethod
     def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """Signals (B, ...) at theta, name -> (B,)."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def identity(self) -> str:
         """A text that two equal simulators share, and no others."""
-        raise NotImplementedError
 
     @property
     def batched(self) -> "Batched":
@@ -183,7 +184,7 @@ def stir_simulator(recordings: list[Recording], particles: int) -> StirSimulator
     return StirSimulator(tuple(recordings), setups)
 
 
-Batched = Callable[[Mapping[str, Any], Any], "PourBatch"]
+BatchOf = Callable[[Mapping[str, Any], Any], "PourBatch"]
 """(theta, seeds) -> the pours to be made; theta holds liquid, coefficients and `RATE`."""
 
 
@@ -191,7 +192,7 @@ class PourOutcome(Protocol):
     """Which pours are made of each theta, and what is kept of them; `settings` identify it."""
 
     def __call__(
-        self, batch: Batched, theta: Mapping[str, NDArray], seeds: NDArray
+        self, batch: BatchOf, theta: Mapping[str, NDArray], seeds: NDArray
     ) -> NDArray[np.float64]:
         """Shape (B, ...) for theta, name -> (B,)."""
         ...

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from .effect import Effect
 from .effects import EFFECTS
 from .liquid import Liquid
+from .number_checks import checked_batch
 from .rig import Rig
 
 
@@ -60,23 +61,13 @@ def acting_in(scene: str, effects: Mapping[str, ArrayLike] | None, size: int) ->
 
 
 def _coefficient(name: str, value: ArrayLike, size: int) -> np.ndarray:
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as err:
-        raise ValueError(f"the coefficient of {name} must be a number, got {value!r}") from err
-    if array.ndim > 1 or array.size not in (1, size):
-        raise ValueError(
-            f"the coefficient of {name} has shape {array.shape}, but there are {size} "
-            f"simulations; give a scalar or an array of shape ({size},)"
-        )
-    if not np.isfinite(array).all():
-        raise ValueError(f"the coefficient of {name} must be finite, got {value!r}")
+    array = checked_batch(f"the coefficient of {name}", value, size)
     lowest, highest = EFFECTS[name].lowest, EFFECTS[name].highest
     if (array < lowest).any() or (array > highest).any():
         raise ValueError(
             f"the coefficient of {name} must be {lowest:g} to {highest:g}, got {value!r}"
         )
-    return np.broadcast_to(array, (size,))
+    return array
 
 
 def with_adhesion(

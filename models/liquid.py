@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .number_checks import checked_batch
+
 TENSION_AT_ONE = 0.08  # N/m, surface tension of a liquid whose cohesion is 1
 FIELDS = ("viscosity", "cohesion", "density")  # names that no effect may have
 
@@ -35,20 +37,12 @@ class Liquid:
         """
         fields = {}
         for name in (*FIELDS, "adhesion"):
-            try:
-                value = np.asarray(getattr(self, name), dtype=np.float32)
-            except (TypeError, ValueError):
-                given = getattr(self, name)
-                raise ValueError(f"{name} must be a number or an array, got {given!r}") from None
+            given = getattr(self, name)
+            value = checked_batch(name, given, size).astype(np.float32)
             least = -np.inf if name == "adhesion" else 0.0
             if not np.isfinite(value).all() or (value < least).any():
-                raise ValueError(f"{name} must be finite and not negative, got {value}")
-            if value.ndim > 1 or value.size not in (1, size):
-                raise ValueError(
-                    f"{name} has shape {value.shape}, but there are {size} simulations; "
-                    f"give a scalar or an array of shape ({size},)"
-                )
-            fields[name] = np.broadcast_to(value, (size,)).copy()
+                raise ValueError(f"{name} must be finite and not negative, got {given}")
+            fields[name] = value
         if (fields["density"] == 0).any():
             raise ValueError("density must be positive [kg/m³], got 0")
         return Liquid(**fields)

@@ -22,6 +22,26 @@ def check_numbers(what: str, *, zero: bool = False, **numbers: float) -> None:
             raise ValueError(f"{what}: {name} must be a number, finite and {wanted}, got {value!r}")
 
 
+def checked_batch(what: str, value: ArrayLike, size: int) -> np.ndarray:
+    """A number, or one for each of `size` simulations, as an array of shape [size].
+
+    Raises:
+        ValueError: it is something else, not finite, or of another shape.
+    """
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as err:
+        raise ValueError(f"{what} must be a number or an array, got {value!r}") from err
+    if array.ndim > 1 or array.size not in (1, size):
+        raise ValueError(
+            f"{what} has shape {array.shape}, but there are {size} simulations; "
+            f"give a scalar or an array of shape ({size},)"
+        )
+    if not np.isfinite(array).all():
+        raise ValueError(f"{what} must be finite, got {value!r}")
+    return np.broadcast_to(array, (size,))
+
+
 def checked_seeds(seeds: ArrayLike) -> np.ndarray:
     """Seeds as an array of shape [B].
 

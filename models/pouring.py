@@ -15,7 +15,7 @@ from . import runtime
 from .cups import FASTEST, SLOWEST, Cups
 from .effect_coefficients import Acting, acting_in, changed_wetting, liquid_sets, with_adhesion
 from .liquid import TENSION_AT_ONE, Liquid
-from .number_checks import check_numbers, checked_seeds
+from .number_checks import check_numbers, checked_batch, checked_seeds
 from .pours.flights import Flights, landing_of
 from .pours.march import PourRotation, Pours, march
 from .pours.resolution import steps_for
@@ -117,7 +117,7 @@ def pour(
         FailedSimulation: a pour went wrong; its fractions are NaN.
     """
     seeds = checked_seeds(seeds)
-    distance = _batch("distance", action.distance, len(seeds))
+    distance = checked_batch("distance", action.distance, len(seeds))
     landed = landings(liquid, action.angular_velocity, cups, seeds, particles, effects)
     return landed.into(distance, cups.receiver.radius)
 
@@ -212,7 +212,7 @@ def _pours(
 
 
 def _checked_rate(angular_velocity: ArrayLike, size: int) -> np.ndarray:
-    rate = _batch("angular_velocity", angular_velocity, size)
+    rate = checked_batch("angular_velocity", angular_velocity, size)
     if (rate <= 0).any():
         raise ValueError(f"angular_velocity must be positive [rad/s], got {rate.min()}")
     wrong = rate[(rate < SLOWEST) | (rate > FASTEST)]
@@ -222,10 +222,3 @@ def _checked_rate(angular_velocity: ArrayLike, size: int) -> np.ndarray:
             "is it in rad/s?"
         )
     return rate
-
-
-def _batch(name: str, value: ArrayLike, size: int) -> np.ndarray:
-    array = np.asarray(value, dtype=np.float64)
-    if array.ndim > 1 or array.size not in (1, size) or not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite and of shape () or ({size},), got {value}")
-    return np.broadcast_to(array, (size,))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..calibration.model_error import Clean, clean_residuals, usual_for
 from ..calibration.result import Calibration
-from ..calibration.stirs import camera_noise, effects_of, held_out_noise, stir_experiment
+from ..calibration.stirs import effects_of, held_out_noise, stir_experiment
 from ..errors import Argument, InputError
 from ..inputs.frame import recording_warnings
 from ..inputs.open import Source, open_recordings
@@ -20,10 +20,9 @@ from ..progress import phases
 from ..run.compute import open_compute
 from ..run.given_pours import keep_pours
 from ..run.run import Run, RunOrPath
-from ..simulators import StirSimulator, stir_simulator
-from .criticism_file import criticism_tree
-from .findings import Findings
-from .inputs import ComparedData, Inputs, check_effects, open_inputs
+from ..simulators import stir_simulator
+from .criticism_file import Sources, criticism_tree
+from .inputs import Inputs, check_effects, open_inputs
 from .pours import as_prior, pour_experiment
 from .proposals import pour_proposals, stir_proposals
 from .result import Criticism
@@ -87,14 +86,11 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     named: dict[str, Any] = {"effects": effects, "accept": accept}
     settings = CriticismSettings(**named, seed=seed, batch=batch)
     check_effects(settings)
-    given = ComparedData(
-        open_recordings(held_out, Argument("held_out")),
-        open_recordings(baseline, Argument("baseline")),
-        *(pours, held_out_pours, cups),
-    )
+    kept_back = open_recordings(held_out, Argument("held_out"))
+    clean = open_recordings(baseline, Argument("baseline"))
     with Run.entered(calibration) as run:
         base = Calibration.of(run)
-        inputs = open_inputs(base, settings, given)
+        inputs = open_inputs(base, settings, kept_back, clean, pours, held_out_pours, cups)
         for notice in recording_warnings(inputs.compared):
             logger.warning(notice)
         for name in inputs.left_out:
@@ -107,16 +103,18 @@ def criticise(  # noqa: PLR0913  the one call that most users make
                 return finished
             with run.bank() as bank, phases(shown=progress) as report:
                 own = replace(compute, batch=settings.batch, bank=bank)
-                findings = _find(base, inputs, own, report)
-                tree = criticism_tree(findings)
-        summary = CriticismSummary.from_findings(findings, tree, time.perf_counter() - started)
+                sources, clean_runs = _find(base, inputs, own, report)
+                tree = criticism_tree(inputs, sources)
+        seconds = time.perf_counter() - started
+        summary = CriticismSummary.of(inputs, sources, clean_runs, tree, seconds)
         run.keep("criticise", tree, inputs.made_from, summary.to_json())
         return Criticism.made(base, tree)
 
 
 def _find(
     calibration: Calibration, inputs: Inputs, compute: "Compute", report: "Report"
-) -> Findings:
+) -> tuple[Sources, int]:
+    """What the engine concludes, and how often it simulated clean recordings before."""
     clean = clean_residuals(
         inputs.baseline,
         inputs.stirring.setups[0].particles,
@@ -125,7 +123,6 @@ def _find(
         compute=compute,
         report=report,
     )
-    cameras = camera_noise(inputs.stirring.recordings)
     how: dict[str, Any] = {
         "executor": compute.executor,
         "timeout": compute.timeout,
@@ -134,30 +131,35 @@ def _find(
         "seed": inputs.settings.seed,
         "level": inputs.level,
     }
-    stirs = _stirs(calibration, inputs, cameras, clean, how | {"report": report})
-    how["report"] = lambda phase, n: report(f"pours, {phase}", n)
-    poured = inputs.table and _pours(calibration, stirs, inputs.table, inputs, how)
-    return Findings(calibration, inputs, cameras, tuple(clean), stirs, poured)
+    sources = {"stirs": _stirs(calibration, inputs, clean, how | {"report": report})}
+    if inputs.table is not None:
+        how["report"] = lambda phase, n: report(f"pours, {phase}", n)
+        known = calibration.prior, sources["stirs"]
+        sources["pours"] = _pours(*known, inputs, inputs.table, how)
+    return sources, sum(one.simulations for one in clean)
 
 
 def _stirs(
-    calibration: Calibration,
-    inputs: Inputs,
-    cameras: "inference.criticism.AutoregressiveNoise",
-    clean: Sequence[Clean],
-    how: Mapping[str, Any],
+    calibration: Calibration, inputs: Inputs, clean: Sequence[Clean], how: Mapping[str, Any]
 ) -> "inference.criticism.Criticism":
     from .. import inference
 
-    stirring, settings = inputs.stirring, inputs.settings
+    stirring, settings, cameras = inputs.stirring, inputs.settings, inputs.cameras
     extensions = effects_of("stir", settings.effects)
     viscosity = calibration.summary.best.get("viscosity")
+
+    def held_out(recording: Recording) -> "inference.criticism.Experiment":
+        own = stir_simulator([recording], stirring.setups[0].particles)
+        noise = held_out_noise(recording, stirring.recordings)
+        usual = usual_for(own, clean, viscosity)
+        return stir_experiment(own, noise, usual, recording.path.name)
+
     return inference.criticism.criticise(
         stir_experiment(stirring, cameras, usual_for(stirring, clean, viscosity), "stir"),
         calibration.prior,
         extensions,
         earlier=_learned_from(calibration),
-        held_out=[_kept_back(one, stirring, clean, viscosity) for one in inputs.held_out],
+        held_out=[held_out(one) for one in inputs.held_out],
         proposals=stir_proposals(
             stirring, cameras, usual_for(stirring, clean, viscosity, elsewhere=True)
         ),
@@ -167,25 +169,17 @@ def _stirs(
     )
 
 
-def _kept_back(
-    recording: Recording, fitted: StirSimulator, clean: Sequence[Clean], viscosity: float | None
-) -> "inference.criticism.Experiment":
-    own = stir_simulator([recording], fitted.setups[0].particles)
-    cameras = held_out_noise(recording, fitted.recordings)
-    return stir_experiment(own, cameras, usual_for(own, clean, viscosity), recording.path.name)
-
-
 def _pours(
-    calibration: Calibration,
+    prior: "inference.Prior",
     stirs: "inference.criticism.Criticism",
-    table: PourTable,
     inputs: Inputs,
+    table: PourTable,
     how: Mapping[str, Any],
 ) -> "inference.criticism.Criticism":
     """The same for pours, with the posterior of the stirs as the prior."""
     from .. import inference
 
-    density, settings = calibration.liquid_density, inputs.settings
+    cups, density, settings = inputs.cups, inputs.density, inputs.settings
     acting = effects_of("pour", settings.effects)
     known = stirs.extended or stirs.base.hypothesis
     poured_too = [name for name in stirs.accepted if name in acting]
@@ -197,16 +191,14 @@ def _pours(
             fix="give further effects to look for in the pours, or no `pours`",
         )
     taught = as_prior(stirs.posterior.theta, stirs.posterior.weights, known.fit.prior)
-    names = (*calibration.prior.names, *poured_too)
-    base = inference.Prior({name: taught.distributions[name] for name in names})
+    names = (*prior.names, *poured_too)
+    held_out = [] if inputs.held_out_table is None else [inputs.held_out_table]
     return inference.criticism.criticise(
-        pour_experiment(table, inputs.cups, density),
-        base,
+        pour_experiment(table, cups, density),
+        inference.Prior({name: taught.distributions[name] for name in names}),
         extensions,
-        held_out=[
-            pour_experiment(one, inputs.cups, density) for one in [inputs.held_out_table] if one
-        ],
-        proposals=pour_proposals(inputs.cups, density),
+        held_out=[pour_experiment(one, cups, density) for one in held_out],
+        proposals=pour_proposals(cups, density),
         accept=_among(settings.accept, extensions),
         plan=settings.pour_plan,
         **how,

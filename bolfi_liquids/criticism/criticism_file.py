@@ -21,13 +21,16 @@ import numpy as np
 
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..inputs.fields import PLANE_NAMES
-from .findings import Findings
+from .inputs import Inputs
+from .pours import OUTCOMES
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
     from .. import inference
 
+Sources = dict[str, "inference.criticism.Criticism"]
+"""What the engine concluded on `stirs` and, where some were given, on `pours`."""
 
 UNITS = {"stirs": {"units": "rad"}, "pours": {"units": "1"}}
 DIMENSIONLESS = {"units": "1"}
@@ -46,70 +49,89 @@ class EffectStatus(StrEnum):
     FAILED = "untested: its simulations failed"
 
 
-def criticism_tree(findings: Findings) -> "DataTree":
+def criticism_tree(inputs: Inputs, sources: Sources) -> "DataTree":
     """Everything that a report shows."""
     from xarray import DataTree
 
-    groups: dict[str, Any] = {"/posterior": _posterior(findings)}
-    for name, source in findings.sources.items():
-        groups[f"/{name}/residual"] = _residual(findings, name, source)
-        groups[f"/{name}/where"] = _where(source, UNITS[name])
+    groups: dict[str, Any] = {"/posterior": _posterior(sources, inputs.settings.seed)}
+    for name, source in sources.items():
+        units = UNITS[name]
+        residual = _stirs_residual if name == "stirs" else _pours_residual
+        groups[f"/{name}/residual"] = residual(inputs, source)
+        groups[f"/{name}/where"] = _where(source, units)
         groups[f"/{name}/effects"] = _effects(source)
         groups[f"/{name}/confusion"] = _confusion(source)
         if source.gaps:
-            groups[f"/{name}/held_out"] = _held_out(source, UNITS[name])
+            groups[f"/{name}/held_out"] = _held_out(source, units)
         if source.suggestions:
             groups[f"/{name}/suggestions"] = _suggestions(source)
     tree = DataTree.from_dict(groups)
+    accepted = [name for source in sources.values() for name in source.accepted]
     tree.attrs.update(
-        accepted=list(findings.accepted),
-        requested=list(findings.requested),
-        liquid_density=findings.calibration.liquid_density,
+        accepted=accepted,
+        requested=[name for name in accepted if name in (inputs.settings.accept or ())],
+        liquid_density=inputs.density,
     )
     return tree
 
 
-def _posterior(findings: Findings) -> "Dataset":
+def last_models(sources: Sources) -> "list[inference.criticism.Hypothesis]":
+    """The last model that was extended, or else the stirs' base model; and the stirs' before it,
+    where it knows of effects that do not act in pours."""
+    stirs = sources["stirs"].extended or sources["stirs"].base.hypothesis
+    last = sources["pours"].extended if "pours" in sources else None
+    if last is None:
+        return [stirs]
+    return [last] if set(stirs.names) <= set(last.fit.prior.names) else [last, stirs]
+
+
+def best_of(sources: Sources) -> dict[str, float]:
+    """The most probable parameters and coefficients of these models."""
+    return {k: v for model in last_models(sources)[::-1] for k, v in model.best.items()}
+
+
+def _posterior(sources: Sources, seed: int) -> "Dataset":
     """Draws of all parameters; coefficients that act in stirs alone are those of the stirs."""
-    seed = findings.inputs.settings.seed
-    sampled = [
+    known, *others = (
         model.fit.sample("nuts", chains=4, draws=1000, seed=seed)["posterior"].to_dataset()
-        for model in findings.models
-    ]
-    known = sampled[0]
-    for other in sampled[1:]:
+        for model in last_models(sources)
+    )
+    for other in others:
         known = known.assign({n: v for n, v in other.items() if n not in known})
     return known
 
 
-def _residual(findings: Findings, name: str, source: "inference.criticism.Criticism") -> "Dataset":
+def _stirs_residual(inputs: Inputs, source: "inference.criticism.Criticism") -> "Dataset":
+    coords = {
+        "time": ("frame", inputs.stirring.time, {"units": "s"}),
+        "recording": ("frame", inputs.stirring.member),
+        "plane": list(PLANE_NAMES),
+    }
+    return _residual(source, ("frame", "plane"), UNITS["stirs"]).assign_coords(coords)
+
+
+def _pours_residual(inputs: Inputs, source: "inference.criticism.Criticism") -> "Dataset":
+    table = inputs.table
+    assert table is not None
+    coords = {
+        "angular_velocity": ("pour", table.angular_velocity, {"units": "rad s-1"}),
+        "distance": ("pour", table.distance, {"units": "m"}),
+        "outcome": list(OUTCOMES),
+    }
+    return _residual(source, ("outcome", "pour"), UNITS["pours"]).assign_coords(coords)
+
+
+def _residual(
+    source: "inference.criticism.Criticism", dims: tuple[str, str], units: dict[str, str]
+) -> "Dataset":
     from xarray import Dataset
 
-    if name == "stirs":
-        dims = ("frame", "plane")
-        time = findings.inputs.stirring.time
-        coords = {
-            "time": ("frame", time, {"units": "s"}),
-            "recording": ("frame", findings.inputs.stirring.member),
-            "plane": list(PLANE_NAMES),
-        }
-    else:
-        table = findings.inputs.table
-        assert table is not None
-        dims = ("outcome", "pour")
-        coords = {
-            "angular_velocity": ("pour", table.angular_velocity, {"units": "rad s-1"}),
-            "distance": ("pour", table.distance, {"units": "m"}),
-            "outcome": ["spilled", "retained"],
-        }
-    columns = {"observed": (dims, source.observed)}
-    models = {"before": source.base.hypothesis, "after": source.extended}
-    for when, hypothesis in models.items():
-        if hypothesis is not None:
-            left, sd = _left(hypothesis)
-            expected = source.observed - left
-            columns |= {f"expected_{when}": (dims, expected), f"sd_{when}": (dims, sd)}
-    return Dataset({key: (*of, UNITS[name]) for key, of in columns.items()}, coords=coords)
+    columns = {"observed": source.observed}
+    for when, model in {"before": source.base.hypothesis, "after": source.extended}.items():
+        if model is not None:
+            left, sd = _left(model)
+            columns |= {f"expected_{when}": source.observed - left, f"sd_{when}": sd}
+    return Dataset({key: (dims, values, units) for key, values in columns.items()})
 
 
 def _left(hypothesis: "inference.criticism.Hypothesis") -> tuple[np.ndarray, np.ndarray]:

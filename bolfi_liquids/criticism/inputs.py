@@ -1,15 +1,16 @@
 """What a criticism is given, read and checked."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from ..calibration.model_error import check_baseline, check_rig
 from ..calibration.result import Calibration
-from ..calibration.stirs import names_of_effects
+from ..calibration.stirs import camera_noise, names_of_effects
 from ..errors import Argument, InputError
 from ..inputs.pour_table import Pours, PourTable, check_scene, table_and_cups, table_of
 from ..inputs.recording import Recording
@@ -17,6 +18,7 @@ from ..inputs.settings import FALSE_ALARM_RATE, CriticismSettings
 from ..simulators import StirSimulator, same_liquid, stir_simulator
 
 if TYPE_CHECKING:
+    from ..inference.criticism import AutoregressiveNoise
     from ..models import Cups
 
 
@@ -52,6 +54,16 @@ class Inputs:
         return (*self.held_out, *self.baseline)
 
     @property
+    def density(self) -> float:
+        """Of the liquid [kg/m3]."""
+        return self.stirring.recordings[0].number("liquid_density")
+
+    @cached_property
+    def cameras(self) -> "AutoregressiveNoise":
+        """Their noise in the stirs."""
+        return camera_noise(self.stirring.recordings)
+
+    @property
     def level(self) -> float:
         """p-value below which a source is rejected, so that all of them share one error rate."""
         return FALSE_ALARM_RATE if self.table is None else FALSE_ALARM_RATE / 2.0
@@ -81,18 +93,14 @@ class Inputs:
         return json.loads(json.dumps(made_from))  # as it will be read
 
 
-class ComparedData(NamedTuple):
-    """Data beside the calibrated recordings; see `criticise`."""
-
-    held_out: list[Recording]
-    baseline: list[Recording]
-    pours: Pours | None = None
-    held_out_pours: Pours | None = None
-    cups: "Cups | str | Path | None" = None
-
-
-def open_inputs(
-    calibration: Calibration, settings: CriticismSettings, given: ComparedData
+def open_inputs(  # noqa: PLR0913  what `criticise` is given
+    calibration: Calibration,
+    settings: CriticismSettings,
+    held_out: list[Recording],
+    baseline: list[Recording],
+    pours: Pours | None = None,
+    held_out_pours: Pours | None = None,
+    cups: "Cups | str | Path | None" = None,
 ) -> Inputs:
     """Read what is given as a path, and check all of it.
 
@@ -101,37 +109,27 @@ def open_inputs(
     """
     particles = int(calibration.record["settings"]["particles"])
     stirring = stir_simulator(calibration.run.recordings, particles)
-    kept_back, believed = given.held_out, given.baseline
-    _check_held_out(stirring, kept_back)
-    others = _others(believed, [*stirring.recordings, *kept_back])
-    check_baseline(stirring, others)
-    table, cups = table_and_cups(given.pours, given.cups)
-    held_out_table = table_of(given.held_out_pours, Argument("held_out_pours"))
+    _check_held_out(stirring, held_out)
+    used = {recording.hash for recording in (*stirring.recordings, *held_out)}
+    clean = {recording.hash: recording for recording in baseline if recording.hash not in used}
+    left_out = dict.fromkeys(one.path.name for one in baseline if one.hash in used)
+    check_baseline(stirring, tuple(clean.values()))
+    table, cups = table_and_cups(pours, cups)
+    held_out_table = table_of(held_out_pours, Argument("held_out_pours"))
     _check_pours(table, held_out_table, settings)
     if held_out_table is not None:
         check_scene(held_out_table, cups)
     return Inputs(
         after=calibration.key,
         stirring=stirring,
-        held_out=tuple(kept_back),
-        baseline=others,
-        left_out=_names_of(r for r in believed if r.hash not in {one.hash for one in others}),
+        held_out=tuple(held_out),
+        baseline=tuple(clean.values()),
+        left_out=tuple(left_out),
         table=table,
         held_out_table=held_out_table,
         cups=cups,
         settings=settings,
     )
-
-
-def _names_of(recordings: Iterable[Recording]) -> tuple[str, ...]:
-    """Each once."""
-    return tuple(dict.fromkeys(recording.path.name for recording in recordings))
-
-
-def _others(baseline: list[Recording], used: Sequence[Recording]) -> tuple[Recording, ...]:
-    """The clean recordings that are neither criticised nor held out, each once."""
-    taken = {recording.hash for recording in used}
-    return tuple({r.hash: r for r in baseline if r.hash not in taken}.values())
 
 
 def _check_held_out(stirring: StirSimulator, held_out: Sequence[Recording]) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..inputs.pour_table import PourTable
 from ..seeds import Phase, simulation_seeds
-from ..simulators import RATE, Batched, PourSimulator
+from ..simulators import RATE, BatchOf, PourSimulator
 from .pour_noise import PourNoise
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Fractions:
     distance: NDArray[np.float64]
 
     def __call__(
-        self, batch: Batched, theta: Mapping[str, NDArray], seeds: NDArray
+        self, batch: BatchOf, theta: Mapping[str, NDArray], seeds: NDArray
     ) -> NDArray[np.float64]:
         from .. import models
 

@@ -40,8 +40,8 @@ class SourceVerdict:
             VerdictKind(verdict.kind),
             tuple(verdict.effects),
             verdict.p_value,
-            refuted_by_held_out(source),
-            held_out_count(source),
+            tuple(" with ".join(names) for names in source.refuted),
+            max(map(len, source.gaps.values()), default=0),
         )
 
 
@@ -133,34 +133,32 @@ class GapSummary:
         best, base = source.leading, source.base.hypothesis
         gaps = () if best is None else source.gaps.get(best.names, ())
         noise = rms(np.sqrt(np.diag(base.own) + np.diag(source.measurement)))
-        before, after = _rms(base), None if best is None else _rms(best.hypothesis)
         known = float(np.hypot(noise, source.usual))
+        before, after = _rms(base), None if best is None else _rms(best.hypothesis)
         numbers = {
             "before": beyond(before, known),
             "after": None if after is None else beyond(after, known),
-            "held_out_before": _pooled([gap.unexplained[0] for gap in gaps]),
-            "held_out_after": _pooled([gap.unexplained[1] for gap in gaps]),
             "noise": noise,
             "usual": source.usual,
             "rms_before": before,
             "rms_after": after,
-            "held_out_rms_before": _pooled([gap.before for gap in gaps]),
-            "held_out_rms_after": _pooled([gap.after for gap in gaps]),
-            "held_out_noise": _pooled([gap.noise for gap in gaps]),
-            "held_out_usual": _pooled([gap.usual for gap in gaps]),
         }
-        in_degrees: dict[str, Any] = {name: _degrees(value) for name, value in numbers.items()}
+        held_out = {
+            "before": [gap.unexplained[0] for gap in gaps],
+            "after": [gap.unexplained[1] for gap in gaps],
+            "noise": [gap.noise for gap in gaps],
+            "usual": [gap.usual for gap in gaps],
+            "rms_before": [gap.before for gap in gaps],
+            "rms_after": [gap.after for gap in gaps],
+        }
+        numbers |= {
+            f"held_out_{name}": rms(np.array(of)) if of else None for name, of in held_out.items()
+        }
+        in_degrees: dict[str, Any] = {
+            name: None if value is None else float(np.degrees(value))
+            for name, value in numbers.items()
+        }
         return cls(**in_degrees)
-
-
-def refuted_by_held_out(source: "inference.criticism.Criticism") -> tuple[str, ...]:
-    """Explanations that held-out data contradict, by name."""
-    return tuple(" with ".join(names) for names in source.refuted)
-
-
-def held_out_count(source: "inference.criticism.Criticism") -> int:
-    """Number of held-out data on which something was tried."""
-    return max(map(len, source.gaps.values()), default=0)
 
 
 def significant_windows(source: "inference.criticism.Criticism") -> tuple[DifferingWindow, ...]:
@@ -172,11 +170,3 @@ def significant_windows(source: "inference.criticism.Criticism") -> tuple[Differ
 
 def _rms(hypothesis: "inference.criticism.Hypothesis") -> float:
     return rms(hypothesis.difference)
-
-
-def _pooled(values: list[float]) -> float | None:
-    return rms(np.array(values)) if values else None
-
-
-def _degrees(value: float | None) -> float | None:
-    return None if value is None else float(np.degrees(value))

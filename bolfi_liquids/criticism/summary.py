@@ -1,6 +1,6 @@
 """The section "criticise" of summary.json."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
@@ -11,13 +11,12 @@ from ..calibration.summary import ParameterSummary
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..inputs.frame import named_faults
 from ..run.summary import Number, Section
+from .criticism_file import Sources, best_of
 from .source_summary import (
     DifferingWindow,
     GapSummary,
     PourVerdict,
     SourceVerdict,
-    held_out_count,
-    refuted_by_held_out,
     significant_windows,
 )
 
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from xarray import DataTree
 
     from .. import inference
-    from .findings import Findings
+    from .inputs import Inputs
 
 GRAVEST_FIRST = (VerdictKind.EFFECT, VerdictKind.TIE, VerdictKind.UNKNOWN)
 """Order in which the verdicts on several sources decide the one on all of them."""
@@ -133,42 +132,54 @@ class CriticismSummary(Section):
     frame_faults: tuple[str, ...]
 
     @classmethod
-    def from_findings(cls, findings: "Findings", tree: "DataTree", seconds: float) -> Self:
-        """From what a criticism found, its criticism.nc and the time that it took [s]."""
-        sources, posterior = tuple(findings.sources.values()), tree["posterior"].to_dataset()
-        verdict, effects = _together(sources)
-        p_values = [source.verdict.p_value for source in sources]
-        made = sum(one.simulations for one in (*sources, *findings.baseline))
+    def of(
+        cls, inputs: "Inputs", sources: Sources, clean: int, tree: "DataTree", seconds: float
+    ) -> Self:
+        """From what was given and found.
+
+        Args:
+            inputs: What decided it.
+            sources: What was concluded on each.
+            clean: Simulations of the clean recordings.
+            tree: criticism.nc.
+            seconds: Time that it took [s].
+        """
+        posterior, verdicts = (
+            tree["posterior"].to_dataset(),
+            list(map(SourceVerdict.of, sources.values())),
+        )
+        verdict, effects = _together(verdicts)
+        accepted, requested = (tuple(tree.attrs[name]) for name in ("accepted", "requested"))
         return cls(
             verdict=verdict,
             effects=effects,
-            accepted=findings.accepted,
-            requested=findings.requested,
-            unsupported=findings.unsupported,
-            refuted=tuple(name for source in sources for name in refuted_by_held_out(source)),
-            held_out=min(held_out_count(source) for source in _concluding(verdict, sources)),
-            reason=" ".join(source.verdict.reason for source in sources),
-            p_value=min(1.0, len(p_values) * min(p_values)),
-            where=significant_windows(findings.stirs),
-            coefficient={name: ParameterSummary.of(posterior[name]) for name in findings.accepted},
+            accepted=accepted,
+            requested=requested,
+            unsupported=unsupported(sources),
+            refuted=tuple(name for one in verdicts for name in one.refuted),
+            held_out=min(one.held_out for one in verdicts if one.verdict == verdict),
+            reason=" ".join(source.verdict.reason for source in sources.values()),
+            p_value=min(1.0, len(verdicts) * min(one.p_value for one in verdicts)),
+            where=significant_windows(sources["stirs"]),
+            coefficient={name: ParameterSummary.of(posterior[name]) for name in accepted},
             parameters={str(name): ParameterSummary.of(of) for name, of in posterior.items()},
-            best=findings.best,
-            n_simulations=made,
-            gap=GapSummary.of(findings.stirs),
-            stirs=SourceVerdict.of(findings.stirs),
-            pours=None if findings.pours is None else PourVerdict.of(findings.pours),
+            best=best_of(sources),
+            n_simulations=clean + sum(source.simulations for source in sources.values()),
+            gap=GapSummary.of(sources["stirs"]),
+            stirs=verdicts[0],
+            pours=PourVerdict.of(sources["pours"]) if "pours" in sources else None,
             suggestions=tuple(
                 SuggestedExperiment(one.label, tuple(one.between), one.snr)
-                for source in sources
+                for source in sources.values()
                 for one in source.suggestions
             ),
-            untested=tuple(name for source in sources for name in source.untested),
-            baseline=len(findings.baseline),
-            baseline_left_out=tuple(findings.inputs.left_out),
-            noise=CameraNoise.of(findings.cameras),
+            untested=tuple(name for source in sources.values() for name in source.untested),
+            baseline=len(inputs.baseline),
+            baseline_left_out=inputs.left_out,
+            noise=CameraNoise.of(inputs.cameras),
             seconds=seconds,
-            made_from=findings.inputs.made_from,
-            frame_faults=named_faults(findings.inputs.compared),
+            made_from=inputs.made_from,
+            frame_faults=named_faults(inputs.compared),
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -185,18 +196,20 @@ class CriticismSummary(Section):
         return tuple(self.made_from["settings"]["effects"] or ())
 
 
-def _together(
-    sources: "Sequence[inference.criticism.Criticism]",
-) -> tuple[VerdictKind, tuple[str, ...]]:
+def unsupported(sources: Sources) -> tuple[str, ...]:
+    """Accepted effects that do not explain the difference: the test rejects them, or held-out data
+    do."""
+    return tuple(
+        name
+        for source in sources.values()
+        if source.leading is not None and not source.leading.accepted
+        for name in source.accepted
+    )
+
+
+def _together(sources: list[SourceVerdict]) -> tuple[VerdictKind, tuple[str, ...]]:
     """One verdict on all data: what was named anywhere, or else the gravest."""
     for verdict in GRAVEST_FIRST:
-        if named := _concluding(verdict, sources):
-            return verdict, tuple(name for source in named for name in source.verdict.effects)
+        if named := [source for source in sources if source.verdict == verdict]:
+            return verdict, tuple(name for source in named for name in source.effects)
     return VerdictKind.AGREEMENT, ()
-
-
-def _concluding(
-    verdict: VerdictKind, sources: "Sequence[inference.criticism.Criticism]"
-) -> "list[inference.criticism.Criticism]":
-    """The sources of this verdict."""
-    return [source for source in sources if source.verdict.kind == verdict]

@@ -8,6 +8,7 @@ Delta(t) = int_0^t (y - y~)^2 dt.
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -134,6 +135,24 @@ def design(problem: Problem) -> "list[Job]":
     """The simulations to make before the robot moves: all over the prior."""
     engine = _engine(problem, (), np.zeros(problem.shape), problem.settings.seed)
     return _jobs(problem, engine.ask(problem.settings.design), 0)
+
+
+def simulate_plan(stirring: StirSimulator, bank: Path, batch: int, jobs: "list[Job]") -> Made:
+    """Simulate what a bank lacks of these jobs, and keep it there; loads no JAX.
+
+    Args:
+        stirring: Of the plan.
+        bank: File of the simulation bank.
+        batch: Simulations that are made together.
+        jobs: What is wanted.
+    """
+    from ..inference import SimulationBank
+    from ..inference.simulations import Compute, run_missing
+
+    with SimulationBank(bank) as kept:
+        compute = Compute(bank=kept, batch=batch)
+        made = run_missing(stirring.batched, jobs, compute, identity=stirring.identity)
+    return tuple(zip(jobs, made, strict=True))
 
 
 def proposals(problem: Problem, made: Made, observed: NDArray, n: int) -> "list[Job]":

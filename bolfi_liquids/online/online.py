@@ -2,23 +2,22 @@
 
 The path of the gripper is known before the robot moves. So the plan is simulated before and while
 it is carried out, every simulation once and to its end, and after each stroke all of them are
-compared with the data so far. One process simulates, another learns; no call here blocks the
-process that supervises the robot: `update` and `poll` return at once, and what goes wrong is a
-status.
+compared with the data so far. One process simulates, another learns, and a thread gives them their
+tasks; no call here blocks the process that supervises the robot: `update` and `poll` return at
+once, and what goes wrong is a status.
 """
 
 import json
 import os
-import time
+from collections import deque
 from collections.abc import Callable, Mapping
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import BrokenExecutor, Future
 from contextlib import ExitStack
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
+from threading import Event, Thread
 from typing import TYPE_CHECKING, Any, NamedTuple
-
-import numpy as np
 
 from ..calibration.calibrate import calibrate
 from ..errors import Argument, InputError
@@ -35,20 +34,19 @@ from ..run.lock import alone_in
 from ..run.run import RUN_TOML
 from ..run.workers import background_process
 from ..simulators import PourSimulator, stir_simulator
-from .estimate import Answer, Made, OnlineEstimate, Problem, answer, design, proposals
+from .estimate import Made, OnlineEstimate, Problem, answer, design, proposals, simulate_plan
 from .plan import Aligned, PartialRecording, stroke_ends
 from .settings import OnlineSettings
-from .simulate import simulate_plan
 
 if TYPE_CHECKING:
     from ..inference import Prior
-    from ..inference.simulations import Job, Simulation
+    from ..inference.simulations import Job
     from ..models import Cups
     from ..models.trajectory import PivotPath
 
 BANK, LOG = "online.sqlite", "online.jsonl"
 USUAL_CYCLES = 5  # of the pattern at the most, by default
-POLL_SECONDS = 0.02  # s between looks while a caller waits
+POLL_SECONDS = 0.02  # s between looks for data and simulations
 LEARNER_NICENESS = 5  # control and cameras come first
 SIMULATOR_NICENESS = 10  # an estimate matters more than another simulation
 
@@ -77,35 +75,28 @@ class OnlineChoice(NamedTuple):
 
 
 class OnlinePhase(StrEnum):
-    """Phase of an online calibration."""
+    """Phase of an online calibration.
+
+    Attributes:
+        PREPARING: The design is simulated and the map of landings learned. Let the robot move after
+            `wait_until_ready`.
+        READY: Hand over the recording so far by `update` after each stroke.
+        REFUSED: The last data cannot be used. Earlier estimates hold, and later data may be used
+            again.
+        FAILED: No estimate will follow. The recording goes on: calibrate on it by `finish`.
+    """
 
     PREPARING = "preparing"
     READY = "ready"
     REFUSED = "refused"
     FAILED = "failed"
 
-    @property
-    def advice(self) -> str:
-        """What it means and what to do next."""
-        return _ADVICE[self]
-
-
-_ADVICE = {
-    OnlinePhase.PREPARING: "The design is simulated and the map of landings learned. Let the robot "
-    "move after `wait_until_ready`.",
-    OnlinePhase.READY: "Hand over the recording so far by `update` after each stroke.",
-    OnlinePhase.REFUSED: "The last data cannot be used; `status.detail` says why. Earlier "
-    "estimates hold, and later data may be used again.",
-    OnlinePhase.FAILED: "No estimate will follow; `status.detail` says why. The recording goes on: "
-    "calibrate on it by `finish` afterwards.",
-}
-
 
 class Status(NamedTuple):
     """How an online calibration is doing.
 
     Attributes:
-        phase: What it is doing; `phase.advice` says what to do.
+        phase: What it is doing.
         detail: What is being prepared, or what is wrong; "" if nothing is.
         simulations: Finished, failed ones included.
         in_flight: Being simulated.
@@ -120,23 +111,21 @@ class Status(NamedTuple):
 class OnlineCalibration:
     """An online calibration under way; made by `start`, closed by `close` or a `with`.
 
-    `poll` and `update` also give the processes their next tasks: call one of them several times a
-    second.
-
     Attributes:
         settings: What decides it.
         plan: The planned stir.
         ends: When each of its strokes ends [s].
         out: The RUN directory that `finish` makes.
         estimates: All so far.
+        status: How it is doing.
     """
 
     def __init__(
         self,
         problem: Problem,
         out: Path,
-        learn: Callable[[], LandingMap],
-        simulate: "Callable[[list[Job]], list[Simulation]]",
+        learn_pours: Callable[[], LandingMap],
+        simulate: "Callable[[list[Job]], Made]",
         resources: ExitStack,
     ):
         """Begin to prepare.
@@ -144,7 +133,7 @@ class OnlineCalibration:
         Args:
             problem: What stays the same.
             out: See the attribute.
-            learn: Learns the map of landings; it can be pickled.
+            learn_pours: Learns the map of landings; it can be pickled.
             simulate: Simulates the plan; it can be pickled, without JAX.
             resources: To be closed with it.
         """
@@ -152,19 +141,20 @@ class OnlineCalibration:
         (self.plan,) = problem.stirring.recordings
         self.ends = stroke_ends(self.plan)
         self.estimates: list[OnlineEstimate] = []
-        self._problem, self._learn_map, self._simulate_plan = problem, learn, simulate
-        self._phase, self._detail = OnlinePhase.PREPARING, "starting"
+        self.status = Status(OnlinePhase.PREPARING, "starting")
+        self._problem, self._learn_pours, self._simulate_plan = problem, learn_pours, simulate
+        self._told = 0  # estimates that `poll` has returned
+        self._unread: deque[PartialRecording] = deque(maxlen=1)
+        self._prepared, self._closing = Event(), Event()
         self._made: Made = ()
-        self._map: LandingMap | None = None
-        self._aligned: Aligned | None = None  # what was learned from last
-        self._unread: PartialRecording | None = None
-        self._simulating: tuple[list[Job], Future[list[Simulation]]] | None = None
+        self._simulating: Future[Made] | None = None
         self._no_more = ""  # why nothing is simulated any more
-        self._learning: tuple[Future[Any], Callable[[Any], None]] | None = None
         self._resources = resources
+        thread = Thread(target=self._work, name="online calibration", daemon=True)
+        resources.callback(thread.join)
         self._learner = resources.enter_context(background_process(LEARNER_NICENESS))
         self._simulator = resources.enter_context(background_process(SIMULATOR_NICENESS))
-        self._learn(self._take_design, design, problem)
+        thread.start()
 
     @classmethod
     def start(
@@ -221,16 +211,7 @@ class OnlineCalibration:
             # side by side: nothing else is urgent before the robot moves
             batch = max(settings.in_flight, os.cpu_count() or 1)
             simulate = partial(simulate_plan, problem.stirring, bank, batch)
-            made = cls(problem, out, learn, simulate, resources)
-            made._resources = resources.pop_all()  # which it closes from now on
-            return made
-
-    @property
-    def status(self) -> Status:
-        """How it was doing at the last `poll` or `update`."""
-        in_flight = 0 if self._simulating is None else len(self._simulating[0])
-        detail = self._no_more if self._phase == OnlinePhase.READY else self._detail
-        return Status(self._phase, detail, len(self._made), in_flight)
+            return cls(problem, out, learn, simulate, resources.pop_all())
 
     def wait_until_ready(self, timeout: float | None = None) -> bool:
         """Wait until data may come, or preparation failed, or `timeout` [s] has passed.
@@ -238,11 +219,8 @@ class OnlineCalibration:
         Returns:
             Whether it is ready; if not, `status` says why.
         """
-        until = np.inf if timeout is None else time.monotonic() + timeout
-        while self._phase == OnlinePhase.PREPARING and time.monotonic() < until:
-            time.sleep(POLL_SECONDS)
-            self.poll()
-        return self._phase == OnlinePhase.READY
+        self._prepared.wait(timeout)
+        return self.status.phase == OnlinePhase.READY
 
     def update(self, so_far: PartialRecording) -> OnlineEstimate | None:
         """Hand over the recording so far, at best after each stroke; returns at once.
@@ -254,24 +232,13 @@ class OnlineCalibration:
         Returns:
             As `poll`.
         """
-        self._unread = so_far
+        self._unread.append(so_far)
         return self.poll()
 
     def poll(self) -> OnlineEstimate | None:
-        """Take what the processes have finished, and give them what comes next; returns at once.
-
-        Returns:
-            The newest estimate, if one came since the last call.
-        """
-        before = len(self.estimates)
-        if self._phase != OnlinePhase.FAILED:
-            try:
-                self._advance()
-            except BrokenExecutor:
-                self._fail("the process that learns has died; the recording goes on")
-            except Exception as error:
-                self._fail(f"{type(error).__name__}: {error}")
-        return self.estimates[-1] if len(self.estimates) > before else None
+        """The newest estimate, if one came since the last call; returns at once."""
+        before, self._told = self._told, len(self.estimates)
+        return self.estimates[self._told - 1] if self._told > before else None
 
     def finish(self, recording: Source, *, budget: int = 20, progress: bool = True) -> Path:
         """Calibrate on the finished recording by the ordinary `calibrate`, into `out`.
@@ -301,6 +268,7 @@ class OnlineCalibration:
 
     def close(self) -> None:
         """End the other processes; what they have simulated is kept. Closing twice does no harm."""
+        self._closing.set()
         self._resources.close()
 
     def __enter__(self) -> "OnlineCalibration":
@@ -309,82 +277,90 @@ class OnlineCalibration:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _advance(self) -> None:
-        self._take_simulations()
-        if self._learning is not None and self._learning[0].done():
-            (future, take), self._learning = self._learning, None
-            take(future.result())
-        if self._phase == OnlinePhase.PREPARING:
-            self._end_preparation()
-        elif self._learning is None:
-            self._go_on()
+    def _work(self) -> None:
+        """Prepare; then answer data as they come, and simulate in between, until it is closed."""
+        try:
+            self._prepare()
+            aligned = None
+            while self.status.phase is not OnlinePhase.FAILED and not self._is_closing():
+                self._take_simulations()
+                if self._unread:
+                    aligned = self._answer(self._unread.popleft(), aligned)
+                elif aligned is not None:
+                    self._go_on(aligned)
+        except BrokenExecutor:
+            self._fail("the process that learns has died; the recording goes on")
+        except Exception as error:
+            self._fail(f"{type(error).__name__}: {error}")
+        finally:
+            self._prepared.set()
 
-    def _end_preparation(self) -> None:
+    def _is_closing(self) -> bool:
+        """Whether it is closed within `POLL_SECONDS`."""
+        return self._closing.wait(POLL_SECONDS)
+
+    def _prepare(self) -> None:
+        """Learn the map of landings while the design is simulated."""
+        self._simulate(self._learn(design, self._problem))
+        self._tell(detail="learning the map of landings")
+        self._map = self._learn(self._learn_pours)
+        self._tell(detail="simulating the plan")
+        while self._simulating is not None and not self._is_closing():
+            self._take_simulations()
         if self._no_more:
             self._fail(self._no_more)
-        elif self._map is not None:
-            self._detail = "simulating the plan"
-            if self._simulating is None:
-                self._phase = OnlinePhase.READY
+        else:
+            self._tell(phase=OnlinePhase.READY, detail="")
+        self._prepared.set()
 
-    def _go_on(self) -> None:
-        """Answer data first; in between, simulate the points that they suggest."""
-        if self._unread is not None:
-            known = 0 if self._aligned is None else self._aligned.strokes
-            state = self._problem, self._made, self._map, known, self._unread
-            self._unread = None
-            self._learn(self._take_answer, answer, *state)
-        elif self._aligned is not None and self._simulating is None and not self._no_more:
-            n = min(self.settings.in_flight, self.settings.budget - len(self._made))
-            if n > 0:
-                state = self._problem, self._made, self._aligned.observed, n
-                self._learn(self._simulate, proposals, *state)
-
-    def _learn(self, take: Callable[[Any], None], task: Callable[..., Any], *given: Any) -> None:
-        """Give the process that learns a task; `take` gets its result."""
-        self._learning = _submitted(self._learner, task, *given), take
-
-    def _take_design(self, jobs: "list[Job]") -> None:
-        self._simulate(jobs)
-        self._detail = "learning the map of landings"
-        self._learn(self._take_map, self._learn_map)
-
-    def _take_map(self, learned: LandingMap) -> None:
-        self._map = learned
-
-    def _take_answer(self, found: Answer) -> None:
-        self._aligned = found.aligned or self._aligned
-        refused = bool(found.refusal)
-        self._phase = OnlinePhase.REFUSED if refused else OnlinePhase.READY
-        self._detail = found.refusal
+    def _answer(self, so_far: PartialRecording, before: Aligned | None) -> Aligned | None:
+        """Estimate from data, or refuse them; the data that were learned from last."""
+        known = 0 if before is None else before.strokes
+        found = self._learn(answer, self._problem, self._made, self._map, known, so_far)
         if found.estimate is not None:
             self.estimates.append(found.estimate)
             with (self.out / LOG).open("a", encoding="utf-8") as log:
                 log.write(json.dumps(found.estimate.as_record()) + "\n")
+        phase = OnlinePhase.REFUSED if found.refusal else OnlinePhase.READY
+        self._tell(phase=phase, detail=found.refusal or self._no_more)
+        return found.aligned or before
+
+    def _go_on(self, aligned: Aligned) -> None:
+        """Simulate the points that the data suggest, unless others are being simulated."""
+        n = min(self.settings.in_flight, self.settings.budget - len(self._made))
+        if n > 0 and self._simulating is None and not self._no_more:
+            state = self._problem, self._made, aligned.observed, n
+            self._simulate(self._learn(proposals, *state))
+
+    def _learn(self, task: Callable[..., Any], *given: Any) -> Any:
+        """What a task of the process that learns returns."""
+        return self._learner.submit(task, *given).result()
 
     def _simulate(self, jobs: "list[Job]") -> None:
-        self._simulating = jobs, _submitted(self._simulator, self._simulate_plan, jobs)
+        try:
+            self._simulating = self._simulator.submit(self._simulate_plan, jobs)
+        except BrokenExecutor as error:
+            self._simulating = Future()
+            self._simulating.set_exception(error)
+        self._tell(in_flight=len(jobs))
 
     def _take_simulations(self) -> None:
-        if self._simulating is None or not self._simulating[1].done():
+        if self._simulating is None or not self._simulating.done():
             return
-        (jobs, future), self._simulating = self._simulating, None
+        future, self._simulating = self._simulating, None
         try:
-            self._made += tuple(zip(jobs, future.result(), strict=True))
+            self._made += future.result()
         except BrokenExecutor:  # the others are enough for estimates
             self._no_more = "the process that simulates has died"
         except Exception as error:
             self._no_more = f"the plan cannot be simulated: {type(error).__name__}: {error}"
+        detail = self.status.detail or self._no_more
+        self._tell(detail=detail, simulations=len(self._made), in_flight=0)
 
-    def _fail(self, detail: str) -> None:
-        self._phase, self._detail, self._simulating = OnlinePhase.FAILED, detail, None
+    def _fail(self, why: str) -> None:
+        self._tell(phase=OnlinePhase.FAILED, detail=why, in_flight=0)
 
-
-def _submitted(executor: Executor, task: Callable[..., Any], *given: Any) -> Future[Any]:
-    """The future of a task, also where the executor's process has died already."""
-    try:
-        return executor.submit(task, *given)
-    except BrokenExecutor as error:
-        failed: Future[Any] = Future()
-        failed.set_exception(error)
-        return failed
+    def _tell(self, **changes: Any) -> None:
+        """Change the status; what the end of the processes leads to is none."""
+        if not self._closing.is_set():
+            self.status = self.status._replace(**changes)

@@ -7,21 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import Argument
-from ..files import given_path
 from ..inputs.recording import Recording
-from ..inputs.rigs import rig_of
-from ..robot.armed_session import Ask, check_consent, hidden_liquid
-from ..robot.hidden_stir import with_stir
+from ..robot.armed_session import Ask
 from ..robot.live_view import SessionView
-from ..robot.record import check_new, finished, save_on_stop
-from ..robot.stir import (
-    PATHS_AHEAD,
-    StirPlan,
-    plan_stir,
-    stir_session,
-    stir_task,
-)
+from ..robot.record import finished, prepared, stirring
+from ..robot.stir import PATHS_AHEAD, StirPlan
 from .online import OnlineCalibration, OnlineChoice, OnlinePhase
 from .plan import PartialRecording
 
@@ -75,27 +65,14 @@ def record_online(
     """
     from ..hardware.recorder.finalise import rig_attributes
 
-    check_consent(ask, emulate, "record")
-    rig, hidden = rig_of(rig), hidden_liquid(emulate)
-    plan, out = plan_stir(rig, online.cycles), given_path(out, Argument("out"))
-    check_new(out)
-    by = ask if hidden is None else with_stir(rig, plan, hidden)
-    assert by is not None
-    with OnlineCalibration.start(
-        _simulated(plan),
-        rig_attributes(rig),
-        online,
-        progress=progress,
-    ) as calibration:
+    stir = prepared(rig, out, ask, emulate, online.cycles)
+    path, attrs = _simulated(stir.plan), rig_attributes(stir.task.rig)
+    with OnlineCalibration.start(path, attrs, online, progress=progress) as calibration:
         if not calibration.wait_until_ready():
             raise RuntimeError(f"the calibration is not ready: {calibration.status.detail}")
-        with (
-            save_on_stop(out),
-            stir_session(stir_task(rig, plan, out), by) as session,
-            SessionView("stirring and calibrating", shown=progress) as view,
-        ):
-            _Stirring(session, plan, calibration, view, online.told).carry_out()
-        recording = finished(out)
+        with stirring(stir, "stirring and calibrating", progress) as (session, view):
+            _Stirring(session, stir.plan, calibration, view, online.told).carry_out()
+        recording = finished(stir.task.out)
         calibration.finish(recording, progress=progress)
     return recording
 

@@ -2,10 +2,9 @@
 
 import json
 import logging
-from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +23,12 @@ from ..run.given_pours import GIVEN_POURS, digest_of_pours, keep_pours, kept_pou
 from ..run.run import Run, RunOrPath
 from ..simulators import PourSimulator
 from .design import acting_in_pours, box_around, joint_prior
-from .draining import LIQUIDS, TENTH, Draining, Hold, hold_of
+from .draining import LIQUIDS, TENTH, Draining, hold_of
 from .landed_pours import Parcels, pours_in
 from .landing_map import LandingMap, learn_map
 from .pour_file import pour_tree
-from .result import Judged, Pour, PourSummary
-from .spillage import Surface, landing_sd
+from .result import Pour, PourSummary
+from .spillage import landing_sd
 
 if TYPE_CHECKING:
     from ..inference.simulations import Compute, Workers
@@ -175,45 +174,54 @@ def decided(
     Raises:
         InputError, RuntimeError: See `choose_pour`.
     """
-    drawn = strata(calibration, settings.draws, settings.seed)
-    simulated = _learned(calibration, cups, settings, compute, progress)
-    learned = simulated
-    if given is not None:
-        learned = simulated.corrected(given, drawn.search, seed=settings.seed)
-    choice = _search(learned, settings, drawn.search, calibration.best)
-    chosen, plug_in = (
-        learned.judge(action, drawn.judge, seed=settings.seed)
-        for action in (choice.chosen, choice.plug_in)
-    )
-    more: dict[str, Any] = {
-        "hold": _hold(calibration, chosen, choice, simulated, compute, progress)
-    }
+    search, judge = strata(calibration, settings.draws, settings.seed)
+    known: dict[str, Any] = {"rates": settings.iterations, "seed": settings.seed}
+    with calibration.run.bank() as bank:
+        own = replace(compute, bank=bank)
+        simulated = learned = _learned(calibration, cups, settings, own, progress)
+        if given is not None:
+            learned = simulated.corrected(given, search, seed=settings.seed)
+        at_best = {name: np.array([value]) for name, value in calibration.best.items()}
+        tried = {
+            "actions": learned.surface(search, **known),
+            "actions_plug_in": learned.surface(at_best, **known),
+        }
+        chosen, plug_in = (
+            learned.judge(surface.least(settings.risk), judge, seed=settings.seed)
+            for surface in tried.values()
+        )
+        hold = None
+        if chosen.fractions[:, 2].mean() > TENTH:
+            density, effects = calibration.liquid_density, learned.box.effects
+            draining = PourSimulator(cups, density, Draining(), effects)
+            with progress_bar("holding the source", LIQUIDS, shown=progress) as advance:
+                hold = hold_of(draining, chosen.angular_velocity, search, own, advance)
+    corrected = None
     if learned.given is not None:
-        otherwise = simulated.surface(drawn.search, rates=settings.iterations, seed=settings.seed)
-        without = learned.judge(otherwise.least(settings.risk), drawn.judge, seed=settings.seed)
-        more["given"] = learned.given.summary(chosen, without)
-    return _described((chosen, plug_in), choice, learned, settings, calibration, **more)
-
-
-def _hold(
-    calibration: Calibration,
-    chosen: Judged,
-    choice: "_Choice",
-    learned: LandingMap,
-    compute: "Compute",
-    progress: bool,
-) -> Hold | None:
-    """How the source of the chosen pour empties, where much stays in it."""
-    if chosen.fractions[:, 2].mean() <= TENTH:
-        return None
-    density, effects = calibration.liquid_density, learned.box.effects
-    draining = PourSimulator(learned.cups, density, Draining(), effects)
-    with (
-        calibration.run.bank() as bank,
-        progress_bar("holding the source", LIQUIDS, shown=progress) as advance,
-    ):
-        rate, own = chosen.angular_velocity, replace(compute, bank=bank)
-        return hold_of(draining, rate, choice.liquids, own, advance)
+        otherwise = simulated.surface(search, **known).least(settings.risk)
+        without = learned.judge(otherwise, judge, seed=settings.seed)
+        corrected = learned.given.summary(chosen, without)
+    summary = PourSummary.from_judged(
+        chosen,
+        plug_in,
+        settings,
+        n_simulations=learned.pours,
+        map_error=learned.rms_error,
+        least_viscosity=cups.least_viscosity(calibration.liquid_density),
+        fit_status=calibration.summary.fit_status,  # a bad fit was poured by force
+        given=corrected,
+        hold=hold,
+    )
+    tree = pour_tree(chosen, plug_in, tried, search, learned, settings.risk)
+    tree.attrs.update(
+        asdict(settings),
+        cups=json.dumps(cups.settings()),
+        least_viscosity=summary.least_viscosity,
+        landing_sd=landing_sd(cups),
+        map_error=summary.map_error,
+        fit_status=str(summary.fit_status),
+    )
+    return Pour(calibration.run, chosen, plug_in, tree, summary)
 
 
 def _learned(
@@ -228,28 +236,17 @@ def _learned(
     effects = acting_in_pours([name for name in draws if name not in PARAMETERS])
     box = box_around(joint_prior(calibration.prior, effects, cups), draws, calibration.best)
     pours = PourSimulator(cups, calibration.liquid_density, Parcels(), effects)
-    with (
-        calibration.run.bank() as bank,
-        progress_bar("pouring", settings.budget, shown=progress) as advance,
-    ):
-        poured = pours_in(box, pours, settings.budget, replace(compute, bank=bank), advance)
+    with progress_bar("pouring", settings.budget, shown=progress) as advance:
+        poured = pours_in(box, pours, settings.budget, compute, advance)
     return learn_map(box, cups, poured)
 
 
-class SplitDraws(NamedTuple):
-    """Posterior draws, name -> (draws,); the two groups share none.
-
-    Attributes:
-        search: On which every action is tried.
-        judge: On which the chosen action and the plug-in are judged.
-    """
-
-    search: dict[str, NDArray]
-    judge: dict[str, NDArray]
+Draws = dict[str, NDArray[np.float64]]
+"""Posterior draws of liquids, name -> (draws,)."""
 
 
-def strata(calibration: Calibration, draws: int, seed: int) -> SplitDraws:
-    """Distinct strata of the posterior, so that the draws that judge have chosen nothing.
+def strata(calibration: Calibration, draws: int, seed: int) -> tuple[Draws, Draws]:
+    """Draws to search with and draws to judge by; they share none, so the judge chose nothing.
 
     Raises:
         InputError: The posterior has too few draws.
@@ -263,70 +260,8 @@ def strata(calibration: Calibration, draws: int, seed: int) -> SplitDraws:
             fix=f"give {there // groups} at most, or calibrate with more draws",
         )
     drawn = calibration.draws(needed, seed)
-    search = np.arange(needed) % groups == SEARCH_STRATUM
-
-    def of(chosen: NDArray[np.bool_]) -> dict[str, NDArray]:
-        return {name: values[chosen] for name, values in drawn.items()}
-
-    return SplitDraws(of(search), of(~search))
-
-
-class _Choice(NamedTuple):
-    """What was tried, on which liquids, and the two actions that it led to."""
-
-    liquids: Mapping[str, NDArray]
-    over_posterior: Surface
-    at_best: Surface
-    chosen: dict[str, float]
-    plug_in: dict[str, float]
-
-
-def _search(
-    learned: LandingMap,
-    settings: PourSettings,
-    liquids: Mapping[str, NDArray],
-    best: Mapping[str, float],
-) -> _Choice:
-    """Try all actions over the posterior and at theta* (`best`)."""
-    at_theta = {name: np.array([value]) for name, value in best.items()}
-    over_posterior, at_best = (
-        learned.surface(tried, rates=settings.iterations, seed=settings.seed)
-        for tried in (liquids, at_theta)
+    searches = np.arange(needed) % groups == SEARCH_STRATUM
+    search, judge = (
+        {name: values[chosen] for name, values in drawn.items()} for chosen in (searches, ~searches)
     )
-    chosen, plug_in = (tried.least(settings.risk) for tried in (over_posterior, at_best))
-    return _Choice(liquids, over_posterior, at_best, chosen, plug_in)
-
-
-def _described(
-    both: Sequence[Judged],
-    choice: _Choice,
-    learned: LandingMap,
-    settings: PourSettings,
-    calibration: Calibration,
-    **more: Any,
-) -> Pour:
-    """The result from the judged actions; `more` are further fields of its summary."""
-    chosen, plug_in = both
-    cups, fit_status = learned.cups, calibration.summary.fit_status
-    tried = {"actions": choice.over_posterior, "actions_plug_in": choice.at_best}
-    least = cups.least_viscosity(calibration.liquid_density)
-    tree = pour_tree(chosen, plug_in, tried, choice.liquids, learned, settings.risk)
-    tree.attrs.update(
-        asdict(settings),
-        cups=json.dumps(cups.settings()),
-        least_viscosity=least,
-        landing_sd=landing_sd(cups),
-        map_error=learned.rms_error,
-        fit_status=str(fit_status),  # a bad fit was poured by force
-    )
-    summary = PourSummary.from_judged(
-        chosen,
-        plug_in,
-        settings,
-        n_simulations=learned.pours,
-        map_error=learned.rms_error,
-        least_viscosity=least,
-        fit_status=fit_status,
-        **more,
-    )
-    return Pour(calibration.run, chosen, plug_in, tree, summary)
+    return search, judge

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..progress import Advance, silent
 from ..run.summary import Number
 from ..seeds import Phase, simulation_seeds
-from ..simulators import RATE, Batched, PourSimulator
+from ..simulators import RATE, BatchOf, PourSimulator
 
 if TYPE_CHECKING:
     from ..inference.simulations import Compute
@@ -43,7 +43,7 @@ class Draining:
     """Shares (B, T) that are left in sources that are held for as long as `HELD_S` says."""
 
     def __call__(
-        self, batch: Batched, theta: Mapping[str, NDArray], seeds: NDArray
+        self, batch: BatchOf, theta: Mapping[str, NDArray], seeds: NDArray
     ) -> NDArray[np.float64]:
         from .. import models
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..progress import Advance, silent
-from ..simulators import Batched, PourSimulator
+from ..simulators import BatchOf, PourSimulator
 from .design import Box
 from .parcels import PARCELS, parcels_of
 
@@ -37,7 +37,7 @@ class Parcels:
     """Where the liquid lands, as rows (B, ROW) of `parcels`."""
 
     def __call__(
-        self, batch: Batched, theta: Mapping[str, NDArray], seeds: NDArray
+        self, batch: BatchOf, theta: Mapping[str, NDArray], seeds: NDArray
     ) -> NDArray[np.float64]:
         from .. import models
 

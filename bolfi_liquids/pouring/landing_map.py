@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 
 from ..inputs.pour_table import PourTable
 from ..inputs.settings import MIN_MAP_POURS
-from ..progress import Advance, silent
 from ..seeds import Phase, generator
-from ..simulators import RATE, PourSimulator
-from .design import Box, joint_prior, whole
+from ..simulators import RATE
+from .design import Box
 from .given import GivenPours, learn_given
-from .landed_pours import Poured, pours_in
+from .landed_pours import Poured
 from .parcels import fractions_of, scale
 from .result import Judged
 from .spillage import (
@@ -36,8 +35,7 @@ from .spillage import (
 )
 
 if TYPE_CHECKING:
-    from ..inference import Emulation, Prior
-    from ..inference.simulations import Compute
+    from ..inference import Emulation
     from ..models import Cups
 
 RATES = 31  # angular velocities that are tried
@@ -99,9 +97,8 @@ class LandingMap:
             rates: How many angular velocities are tried.
             seed: Of which error each draw meets.
         """
-        outcomes = repeated(liquids, MIN_OUTCOMES)
+        outcomes, misses = self._outcomes(liquids, seed)
         tried = np.geomspace(*self.cups.angular_velocity_range, rates)
-        misses = self.misses(number_of(outcomes), seed)
         found = surface(self.profiles(tried, outcomes, misses), self.cups)
         if self.given is None:
             return found
@@ -118,8 +115,7 @@ class LandingMap:
             liquids, seed: As for `surface`.
         """
         rate, distance = action["angular_velocity"], action["distance"]
-        outcomes = repeated(liquids, MIN_OUTCOMES)
-        misses = self.misses(number_of(outcomes), seed)
+        outcomes, misses = self._outcomes(liquids, seed)
         fractions = self._landed(np.array([rate]), np.array([distance]), outcomes, misses)[0]
         found = Judged(rate, distance, fractions)
         if self.given is None:
@@ -134,17 +130,12 @@ class LandingMap:
         Args:
             liquids: Posterior draws in no order, name -> (draws,).
         """
-        several = number_of(liquids) > 1
+        several = len(next(iter(liquids.values()))) > 1
         chosen, others = (
             {name: values[part] for name, values in liquids.items()}
             for part in (slice(0, BEST_DRAWS, 2), slice(int(several), BEST_DRAWS, 2))
         )
         return self.judge(self.surface(chosen).least("mean"), others)
-
-    def misses(self, count: int, seed: int) -> NDArray[np.int64]:
-        """Left-out pours, each about as often as any other, shape (count,)."""
-        rng = generator(seed, Phase.MAP_MISSES)
-        return rng.permutation(np.arange(count) % self.pours)
 
     @cached_property
     def error(self) -> NDArray[np.float64]:
@@ -174,12 +165,22 @@ class LandingMap:
             table: The pours, within the range of the cups.
             liquids, seed: As for `surface`.
         """
-        outcomes = repeated(liquids, MIN_OUTCOMES)
-        misses = self.misses(number_of(outcomes), seed)
+        outcomes, misses = self._outcomes(liquids, seed)
         spilled = self._spilled(table, outcomes, misses)
         landed = self._landed(table.angular_velocity, table.distance, outcomes, misses)
         retained = landed[:, ::LANDINGS_PER_DRAW, 2].T  # the same wherever the liquid lands
         return replace(self, given=learn_given(table, spilled, retained))
+
+    def _outcomes(
+        self, liquids: Mapping[str, NDArray], seed: int
+    ) -> tuple[dict[str, NDArray], NDArray[np.int64]]:
+        """Draws, each so often that there are `MIN_OUTCOMES`, and the left-out pour whose error
+        each meets, all pours about as often."""
+        there = len(next(iter(liquids.values())))
+        times = -(-MIN_OUTCOMES // there)
+        outcomes = {name: np.repeat(values, times) for name, values in liquids.items()}
+        rng = generator(seed, Phase.MAP_MISSES)
+        return outcomes, rng.permutation(np.arange(there * times) % self.pours)
 
     def _spilled(
         self, table: PourTable, liquids: Mapping[str, NDArray], misses: NDArray
@@ -211,36 +212,6 @@ class LandingMap:
         draws = len(liquids[names[0]])
         theta = {name: np.tile(liquids[name], len(rates)) for name in names}
         return self.emulation.predict(_inputs(self.box, {**theta, RATE: np.repeat(rates, draws)}))
-
-
-def repeated(liquids: Mapping[str, NDArray], least: int) -> dict[str, NDArray]:
-    """Each draw so often that there are `least` in all."""
-    times = -(-least // number_of(liquids))
-    return {name: np.repeat(values, times) for name, values in liquids.items()}
-
-
-def number_of(liquids: Mapping[str, NDArray]) -> int:
-    """Draws."""
-    return len(next(iter(liquids.values())))
-
-
-def map_of_prior(
-    prior: "Prior",
-    pours: PourSimulator,
-    count: int,
-    compute: "Compute",
-    advance: Advance = silent,
-) -> LandingMap:
-    """Of every liquid of a prior.
-
-    Args:
-        prior: Of viscosity and cohesion.
-        pours: The simulator.
-        count: Pours of the sequence, see `pours_in`, which explains the rest.
-        compute, advance: See there.
-    """
-    box = whole(joint_prior(prior, pours.effects, pours.cups))
-    return learn_map(box, pours.cups, pours_in(box, pours, count, compute, advance))
 
 
 def learn_map(box: Box, cups: "Cups", poured: Poured) -> LandingMap:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import Argument, InputError
 from ..files import disk_errno, given_path
@@ -11,13 +11,13 @@ from ..inputs.open import check_recording, read_recording
 from ..inputs.recording import Recording
 from ..inputs.rigs import rig_of
 from ..wording import command
-from .armed_session import Ask, check_consent, dry_run, hidden_liquid
+from .armed_session import Ask, Task, armed_session, check_consent, dry_run, hidden_liquid
 from .hidden_stir import with_stir
 from .live_view import SessionView
-from .stir import follow_plan, plan_stir, stir_session, stir_task
+from .stir import StirPlan, follow_plan, plan_stir, stir_task
 
 if TYPE_CHECKING:
-    from ..hardware import Check, HiddenLiquid, Rig
+    from ..hardware import Check, HiddenLiquid, Rig, Session
 
 
 def record(
@@ -53,20 +53,78 @@ def record(
         MotionRejected: The plan breaks one of the rig's limits.
         SessionStopped: The arm was stopped; the message says why.
     """
+    stir = prepared(rig, out, ask, emulate, cycles)
+    title = "stirring" if ask else "stirring, emulated"
+    with stirring(stir, title, progress) as (session, view):
+        follow_plan(session, stir.plan, view)
+    return finished(stir.task.out)
+
+
+class Stir(NamedTuple):
+    """A stir that is planned and checked, and may be carried out.
+
+    Attributes:
+        plan: What the arm will do.
+        task: The same for a session.
+        by: Shows a person the plan; or the liquid of an emulated arm with rendered cameras, which
+            nobody is asked about.
+    """
+
+    plan: StirPlan
+    task: Task
+    by: "Ask | HiddenLiquid"
+
+
+def prepared(
+    rig: "Rig | str | Path | None",
+    out: str | Path,
+    ask: Ask | None,
+    emulate: "HiddenLiquid | bool",
+    cycles: int | None,
+) -> Stir:
+    """Check and plan a stir; the arguments and errors of `record`."""
     check_consent(ask, emulate, "record")
     opened, hidden = rig_of(rig), hidden_liquid(emulate)
-    plan, out = plan_stir(opened, cycles), given_path(out, Argument("out"))
-    check_new(out)
-    title = "stirring" if hidden is None else "stirring, emulated"
+    plan, directory = plan_stir(opened, cycles), given_path(out, Argument("out"))
+    check_new(directory)
     by = ask if hidden is None else with_stir(opened, plan, hidden)
     assert by is not None
+    return Stir(plan, stir_task(opened, plan, directory), by)
+
+
+@contextmanager
+def stirring(stir: Stir, title: str, progress: bool) -> "Iterator[tuple[Session, SessionView]]":
+    """A session that may move the arm, and its view; what it records is kept whatever stops it.
+
+    Raises:
+        InputError: A camera is a file.
+        RigError: The person did not agree, or something cannot be used.
+        SessionStopped: The arm was stopped; the message says what is left.
+    """
+    from ..hardware import HiddenLiquid, emulated
+    from ..hardware.motion import above_cup
+
+    by, rig, out = stir.by, stir.task.rig, stir.task.out
+    if isinstance(by, HiddenLiquid):
+        by = emulated(rig, above_cup(rig), liquid=by, truth=out)
+    else:
+        _check_devices(rig)
     with (
         save_on_stop(out),
-        stir_session(stir_task(opened, plan, out), by) as session,
+        armed_session(stir.task, by) as session,
         SessionView(title, shown=progress) as view,
     ):
-        follow_plan(session, plan, view)
-    return finished(out)
+        yield session, view
+
+
+def _check_devices(rig: "Rig") -> None:
+    for camera in rig.cameras:
+        if not camera.is_device:
+            raise InputError(
+                f"source = {camera.source!r} is a file",
+                where=f"rig.toml: camera {camera.view}",
+                fix="a real arm moves only while real cameras look on: name a device",
+            )
 
 
 def dry_stir(rig: "Rig", cycles: int | None, out: Path) -> "tuple[str, list[Check]]":

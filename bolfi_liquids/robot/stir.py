@@ -1,20 +1,15 @@
 """A stir carried out: by the robot, or by an emulated arm with rendered cameras."""
 
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import Argument, InputError
 from ..inputs.start import REST_TIME, SETTLING_TIME
-from .armed_session import (
-    Ask,
-    Task,
-    armed_session,
-)
+from .armed_session import Task
 from .live_view import SessionView
 
 if TYPE_CHECKING:
-    from ..hardware import HiddenLiquid, Rig, Session
+    from ..hardware import Rig, Session
     from ..hardware.motion import PosePath
 
 
@@ -77,37 +72,6 @@ def plan_stir(rig: "Rig", cycles: int | None = None) -> StirPlan:
 def stir_task(rig: "Rig", plan: StirPlan, out: Path) -> Task:
     """A stir that the rig's cameras look at, recorded in a directory that is new or empty."""
     return Task(rig, "stirring", plan.paths, out, cameras=True)
-
-
-def stir_session(task: Task, by: "Ask | HiddenLiquid") -> "AbstractContextManager[Session]":
-    """A session that may move the arm: a person has agreed, or the arm is emulated.
-
-    Args:
-        task: As `stir_task` makes it.
-        by: Shows the plan; or the liquid of an emulated arm with rendered cameras, which nobody is
-            asked about. Its `stir` is that of the plan.
-
-    Raises:
-        InputError: A camera is a file.
-        RigError: The person did not agree, or something cannot be used.
-    """
-    from ..hardware import HiddenLiquid, emulated
-    from ..hardware.motion import above_cup
-
-    if not isinstance(by, HiddenLiquid):
-        _check_devices(task.rig)
-        return armed_session(task, by)
-    return armed_session(task, emulated(task.rig, above_cup(task.rig), liquid=by, truth=task.out))
-
-
-def _check_devices(rig: "Rig") -> None:
-    for camera in rig.cameras:
-        if not camera.is_device:
-            raise InputError(
-                f"source = {camera.source!r} is a file",
-                where=f"rig.toml: camera {camera.view}",
-                fix="a real arm moves only while real cameras look on: name a device",
-            )
 
 
 def follow_plan(session: "Session", plan: StirPlan, view: SessionView) -> None:

@@ -1,8 +1,7 @@
 """Liquids that are simulated in one call, by numbers or by arrays of them."""
 
 import warnings
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -114,31 +113,25 @@ class Raising(FluidSimulator):
 
     simulator: FluidSimulator
 
+    @property
+    def identity(self) -> str:
+        """The simulator's."""
+        return self.simulator.identity
+
     def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """What the simulator returns.
 
         Raises:
             RuntimeError: A simulation went wrong.
         """
-        with failures_raised():
-            return self.simulator.simulate(theta, seeds)
+        from ..models import FailedSimulation
 
-
-@contextmanager
-def failures_raised() -> Iterator[None]:
-    """Inside, a simulation that goes wrong is an error.
-
-    Raises:
-        RuntimeError: It went wrong.
-    """
-    from ..models import FailedSimulation
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", FailedSimulation)
-        try:
-            yield
-        except FailedSimulation as err:
-            raise RuntimeError(str(err)) from None
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", FailedSimulation)
+            try:
+                return self.simulator.simulate(theta, seeds)
+            except FailedSimulation as err:
+                raise RuntimeError(str(err)) from None
 
 
 def theta_of(described: Described) -> dict[str, float]:

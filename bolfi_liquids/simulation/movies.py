@@ -11,7 +11,7 @@ from ..inputs.described_liquid import Described
 from ..movie.file import PICTURE_RATE, write_movie
 from ..progress import progress_bar
 from ..simulators import RATE, PourSimulator, StirSimulator
-from .batch import failures_raised, theta_of
+from .batch import theta_of
 
 if TYPE_CHECKING:
     from ..models import PourAction
@@ -22,8 +22,7 @@ def film_stir(movie: Path, described: Described, simulator: StirSimulator, progr
     from ..movie.stir import stir_pictures
 
     (recording,), (setup,) = simulator.recordings, simulator.setups
-    with failures_raised():
-        frames = simulator.frames(theta_of(described), described.seed, PICTURE_RATE)
+    frames = simulator.frames(theta_of(described), described.seed, PICTURE_RATE)
     lines = described.lines()
     caption = [*lines[:2], f"{recording.path.name}, {lines[2]}"]
     _write(movie, stir_pictures(frames, setup, caption), len(frames.time), progress)
@@ -40,9 +39,8 @@ def film_pour(
     from ..movie.pour import pour_pictures
 
     rate, distance = (float(np.asarray(x)) for x in (action.angular_velocity, action.distance))
-    with failures_raised():
-        theta = {**theta_of(described), RATE: rate}
-        frames = simulator.frames(theta, described.seed, PICTURE_RATE)
+    theta = {**theta_of(described), RATE: rate}
+    frames = simulator.frames(theta, described.seed, PICTURE_RATE)
     turn = f"{np.degrees(rate):g}°/s, lip to axis {100 * distance:g} cm"
     caption = [*described.lines(), turn]
     pictures = pour_pictures(frames, simulator.cups, distance, caption)

@@ -24,7 +24,7 @@ from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import check_distance, check_rate
 from ..inputs.recording import Recording, Trajectory
 from ..run.compute import open_compute
-from ..simulators import RATE, Batched, PourSimulator, StirSimulator
+from ..simulators import RATE, BatchOf, PourSimulator, StirSimulator
 from .batch import batch_of, simulated
 from .files import check_targets, pour_dataset, stir_dataset
 from .movies import film_pour, film_stir
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from ..models import Cups
 
 RIG_SIZES = (*LENGTHS, *STICK_WEIGHT)  # attributes of a recording that may be replaced
-DISTANCE_LIMITS = -0.5, 0.5  # m, between lip and receiver; more is a slip of the unit
 PATTERN_SPEED = 0.1  # m/s, of a star or circle that is given by its name
 
 
@@ -99,19 +98,16 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     from ..models import StirSetup
 
     targets, effects = check_targets(movie, out), check_effects(effects, "stir")
-    given = DENSITY if density is None else _density(density)
-    # refused before a file is read
-    batch_of(
-        {"viscosity": viscosity, "cohesion": cohesion, "density": given}, effects, particles, seed
-    )
+    weighed = None if density is None else number_of(density, Argument("density"))
     (opened,) = open_recordings(bundled_recording("glycerin") if recording is None else recording)
     if targets.out is not None and targets.out.exists() and targets.out.samefile(opened.path):
         raise InputError(
             "is the recording itself", where=str(targets.out), fix="choose another name"
         )
-    density = opened.number("liquid_density") if density is None else given
-    liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": density}
-    of_another = _with_rig(opened.attrs, rig) | {"liquid_density": density}
+    if weighed is None:
+        weighed = opened.number("liquid_density")
+    liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": weighed}
+    of_another = _with_rig(opened.attrs, rig) | {"liquid_density": weighed}
     plan = _planned(replace(opened, attrs=of_another), path)
     count = particles or StirSetup.from_recording(plan).particles
     batch = batch_of(liquid, effects, count, seed)
@@ -126,10 +122,6 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     if targets.movie is not None:
         film_stir(targets.movie, batch.one, simulator, progress)
     return found
-
-
-def _density(value: Any) -> float:
-    return number_of(value, Argument("density"))
 
 
 def _with_rig(
@@ -200,7 +192,7 @@ class LandedParticles:
     angular_velocity: float
 
     def __call__(
-        self, batch: Batched, theta: Mapping[str, NDArray], seeds: NDArray
+        self, batch: BatchOf, theta: Mapping[str, NDArray], seeds: NDArray
     ) -> NDArray[np.float64]:
         from .. import models
 
@@ -254,11 +246,11 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     from ..models import Landings, PourAction
 
     targets = check_targets(movie, out)
-    _check_action(angular_velocity, distance)
-    cups, density = cups_of(cups), _density(density)
+    cups, density = cups_of(cups), number_of(density, Argument("density"))
+    check_distance(number_of(distance, Argument("distance")), cups, Argument("distance"))
+    rate = Argument("angular_velocity")
+    check_rate(number_of(angular_velocity, rate), cups, rate)
     liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": density}
-    check_distance(distance, cups, Argument("distance"))
-    check_rate(angular_velocity, cups, Argument("angular_velocity"))
     batch = batch_of(liquid, check_effects(effects, "pour"), particles, seed)
     targets.check_single(batch.single)
     outcome, particles = LandedParticles(angular_velocity), batch.one.particles
@@ -275,22 +267,3 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     if targets.movie is not None:
         film_pour(targets.movie, batch.one, simulator, action, progress)
     return found
-
-
-def _check_action(angular_velocity: float, distance: float) -> None:
-    from ..models.cups import FASTEST, SLOWEST
-
-    angular_velocity = number_of(angular_velocity, Argument("angular_velocity"))
-    distance = number_of(distance, Argument("distance"))
-    low, high = DISTANCE_LIMITS
-    if not low <= distance <= high:
-        raise InputError(
-            f"{100 * distance:g}", where=Argument("distance"), fix="give it in cm; in Python, in m"
-        )
-    if not SLOWEST <= angular_velocity <= FASTEST:
-        slowest, fastest = np.degrees([SLOWEST, FASTEST])
-        raise InputError(
-            f"{np.degrees(angular_velocity):g}",
-            where=Argument("angular_velocity"),
-            fix=f"give {slowest:.2g} to {fastest:.4g} deg/s; in Python, in rad/s",
-        )

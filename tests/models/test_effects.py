@@ -198,7 +198,7 @@ def test_a_stir_that_diverged_stays_nan_behind_every_sensor(stir):
         ({"fill_level": np.zeros((3, 1))}, r"fill_level has shape \(3, 1\)"),
         ({"camera_delay": np.nan}, "camera_delay must be finite"),
         ({"camera_delay": [0.0, np.inf, 0.0]}, "camera_delay must be finite"),
-        ({"camera_delay": "late"}, "camera_delay must be a number, got 'late'"),
+        ({"camera_delay": "late"}, "camera_delay must be a number or an array, got 'late'"),
         ({"camera_delay": None}, "camera_delay must be finite, got None"),
         (["fill_level"], "must map names to coefficients"),
         ({"pivot_friction": -1e-4}, "pivot_friction must not be negative.*-0.0001"),

@@ -8,7 +8,11 @@ from bolfi_liquids.inference.simulations import Compute
 from bolfi_liquids.models import Cups
 from numpy.typing import NDArray
 
-from bolfi_liquids.pouring.landing_map import LandingMap
+from bolfi_liquids.inputs.cups import bundled_cups
+from bolfi_liquids.inputs.prior import default_prior
+from bolfi_liquids.pouring.design import joint_prior, whole
+from bolfi_liquids.pouring.landed_pours import Parcels, pours_in
+from bolfi_liquids.pouring.landing_map import LandingMap, learn_map
 from bolfi_liquids.pouring.spillage import (
     DISTANCE_STEP,
     Profiles,
@@ -16,6 +20,7 @@ from bolfi_liquids.pouring.spillage import (
 )
 from bolfi_liquids.progress import Advance, silent
 from bolfi_liquids.seeds import generator, simulation_seeds
+from bolfi_liquids.simulators import PourSimulator
 
 from .calibrations import PARAMETER_NAMES
 from .outcomes import Outcomes, pour_all
@@ -31,6 +36,14 @@ PRIOR_DRAWS = 64  # draws of the prior over which a pour is chosen without any c
 EXECUTION_SEEDS = 4  # seeds with which a chosen pour is carried out
 
 Action = Mapping[str, float]
+
+
+def map_of_all_liquids(count: int, compute: Compute, advance: Advance = silent) -> LandingMap:
+    """The map of the default prior and the bundled cups, learned from `count` pours."""
+    cups = bundled_cups()
+    box = whole(joint_prior(default_prior(), (), cups))
+    pours = PourSimulator(cups, DENSITY, Parcels())
+    return learn_map(box, cups, pours_in(box, pours, count, compute, advance))
 
 
 def decide(concluded: NDArray, landing_map: LandingMap) -> dict[str, Action]:

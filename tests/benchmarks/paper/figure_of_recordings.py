@@ -11,11 +11,11 @@ from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.pouring.choose import choose_pour
 from bolfi_liquids.pouring.result import Pour
 from bolfi_liquids.pouring.spillage import ACTION, Surface
-from bolfi_liquids.pouring.table_interpolation import between
 
 from .decisions import RULES, Action, decide_unknowing
 from .figure import Drawn
 from .shared_simulations import SharedSimulations
+from .table_interpolation import between
 
 OTHER_CHOICES = {
     "plug_in": ("x", "best at θ* alone"),

@@ -13,20 +13,16 @@ from xarray import Dataset
 from bolfi_liquids.calibration.calibrate import calibrate
 from bolfi_liquids.calibration.result import Calibration
 from bolfi_liquids.inputs.bundled import bundled_recording
-from bolfi_liquids.inputs.cups import bundled_cups
-from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.pouring.landed_pours import Parcels
-from bolfi_liquids.pouring.landing_map import LandingMap, map_of_prior
+from bolfi_liquids.pouring.landing_map import LandingMap
 from bolfi_liquids.progress import progress_bar
 from bolfi_liquids.run.provenance import generations
 from bolfi_liquids.run.run import SIMULATIONS
-from bolfi_liquids.simulators import PourSimulator
 
+from .decisions import map_of_all_liquids
 from .learners import after_strokes, by_stirring_and_pouring
 from .sticky_study import Stuck, spilled_where_it_sticks
 from .study import spillage_study
 from .study_size import Scale
-from .truths import DENSITY
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +51,7 @@ class SharedSimulations:
         """Of all liquids and the bundled cups, by which actions are chosen."""
         count = self.scale.pours
         with progress_bar("pouring", count, shown=True) as advance:
-            pours = PourSimulator(bundled_cups(), DENSITY, Parcels())
-            return map_of_prior(default_prior(), pours, count, self.compute, advance)
+            return map_of_all_liquids(count, self.compute, advance)
 
     @cached_property
     def study(self) -> Dataset:

@@ -7,13 +7,10 @@ from bolfi_liquids.inference.simulations import Compute
 from bolfi_liquids import inference, models
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.pouring.landed_pours import Parcels
-from bolfi_liquids.pouring.landing_map import map_of_prior
 from bolfi_liquids.progress import silent
-from bolfi_liquids.simulators import PourSimulator
 
-from .decisions import decide, decide_unknowing, execute
-from .truths import DENSITY, draw_truths
+from .decisions import decide, decide_unknowing, execute, map_of_all_liquids
+from .truths import draw_truths
 
 HALF_STREAM = 0.03  # m, of what lands evenly about its middle
 
@@ -42,8 +39,7 @@ def spilled(viscosity, distance):
 def landing_map(monkeypatch):
     monkeypatch.setattr(models, "landings", landings)
     with inference.SimulationBank(":memory:") as bank:
-        pours = PourSimulator(bundled_cups(), DENSITY, Parcels())
-        yield map_of_prior(default_prior(), pours, 64, Compute(bank=bank))
+        yield map_of_all_liquids(64, Compute(bank=bank))
 
 
 def test_rules_decide_and_what_they_decide_is_carried_out(landing_map):

@@ -9,7 +9,7 @@ import xarray as xr
 
 from bolfi_liquids.calibration.model_error import Clean, apart, usual_for
 from bolfi_liquids.calibration.stirs import camera_noise, held_out_noise, stir_experiment
-from bolfi_liquids.criticism.inputs import ComparedData, check_effects, open_inputs
+from bolfi_liquids.criticism.inputs import check_effects, open_inputs
 from bolfi_liquids.errors import Argument, InputError
 from bolfi_liquids.inputs.cups import open_cups
 from bolfi_liquids.inputs.open import open_recordings
@@ -28,7 +28,7 @@ def given(calibration, settings=None, **some):
         name: open_recordings(paths, Argument(name)) if name in ("held_out", "baseline") else paths
         for name, paths in unopened.items()
     }
-    return open_inputs(calibration, settings, ComparedData(**opened))
+    return open_inputs(calibration, settings, **opened)
 
 
 @pytest.fixture

@@ -7,9 +7,10 @@ import pytest
 import xarray as xr
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 
-from bolfi_liquids.criticism.criticism_file import _effects, _posterior
-from bolfi_liquids.criticism.findings import Findings
+from bolfi_liquids.criticism import criticism_file
+from bolfi_liquids.criticism.criticism_file import _effects, _posterior, best_of, criticism_tree
 from bolfi_liquids.criticism.pour_noise import REPEATABILITY_SD, SIMULATOR_ERROR_SD, PourNoise
+from bolfi_liquids.criticism.summary import unsupported
 from bolfi_liquids.inputs.settings import CriticismSettings
 
 
@@ -27,12 +28,25 @@ def model(names, value):
 
 def source(accepted, extended):
     base = SimpleNamespace(hypothesis=model((), 0.0))
-    return SimpleNamespace(accepted=accepted, extended=extended, base=base)
+    concluded = {"accepted": accepted, "extended": extended, "base": base}
+    return SimpleNamespace(**concluded, gaps={}, suggestions=())
 
 
-def findings(stirs, pours, accept=None):
-    inputs = SimpleNamespace(settings=CriticismSettings(accept=accept))
-    return Findings(None, inputs, None, (), stirs, pours)
+def findings(stirs, pours):
+    return {"stirs": stirs} if pours is None else {"stirs": stirs, "pours": pours}
+
+
+@pytest.fixture
+def attributes(monkeypatch):
+    """(stirs, pours, accept) -> attributes of criticism.nc, whose tables stay empty."""
+    for table in ("_stirs_residual", "_pours_residual", "_where", "_effects", "_confusion"):
+        monkeypatch.setattr(criticism_file, table, lambda *_: xr.Dataset())
+
+    def attributes(stirs, pours, accept=None):
+        inputs = SimpleNamespace(settings=CriticismSettings(accept=accept), density=1000.0)
+        return criticism_tree(inputs, findings(stirs, pours)).attrs
+
+    return attributes
 
 
 DELAY = source(("camera_delay",), model(("camera_delay",), 1.0))
@@ -59,25 +73,27 @@ NOTHING = source((), None)
     ],
     ids=["nothing", "stirs alone", "pours agree", "a sensor's", "a liquid's"],
 )
-def test_the_last_model_says_what_it_knows_and_the_stirs_the_rest(stirs, pours, expected):
+def test_the_last_model_says_what_it_knows_and_the_stirs_the_rest(
+    attributes, stirs, pours, expected
+):
     together = findings(stirs, pours)
-    assert together.best == expected
-    posterior = _posterior(together)
+    assert best_of(together) == expected
+    posterior = _posterior(together, 0)
     assert {name: float(values.mean()) for name, values in posterior.items()} == expected
-    assert set(together.accepted) <= set(expected)
+    assert set(attributes(stirs, pours)["accepted"]) <= set(expected)
 
 
-def test_what_was_requested_is_told_from_what_was_found():
+def test_what_was_requested_is_told_from_what_was_found(attributes):
     pours = source(("adhesion",), model(("adhesion",), 2.0))
-    assert findings(DELAY, pours, accept=("adhesion",)).requested == ("adhesion",)
-    assert findings(DELAY, pours).requested == ()
+    assert attributes(DELAY, pours, accept=("adhesion",))["requested"] == ["adhesion"]
+    assert attributes(DELAY, pours)["requested"] == []
 
 
-@pytest.mark.parametrize(("explains", "unsupported"), [(True, ()), (False, ("camera_delay",))])
-def test_what_is_accepted_though_it_explains_nothing_is_told(explains, unsupported):
+@pytest.mark.parametrize(("explains", "expected"), [(True, ()), (False, ("camera_delay",))])
+def test_what_is_accepted_though_it_explains_nothing_is_told(explains, expected):
     stirs = source(("camera_delay",), model(("camera_delay",), 1.0))
     stirs.leading = SimpleNamespace(accepted=explains)
-    assert findings(stirs, None, accept=("camera_delay",)).unsupported == unsupported
+    assert unsupported(findings(stirs, None)) == expected
 
 
 def candidate(name, **changes):

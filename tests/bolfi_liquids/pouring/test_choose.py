@@ -117,11 +117,11 @@ def test_the_action_is_that_of_pours_known_in_closed_form(made_up, calibration, 
 
 
 def test_no_draw_that_judges_has_chosen(pour, calibration, pour_settings):
-    drawn = strata(calibration, pour_settings["draws"], 0)
-    assert not np.isin(drawn.judge["viscosity"], drawn.search["viscosity"]).any()
+    search, judge = strata(calibration, pour_settings["draws"], 0)
+    assert not np.isin(judge["viscosity"], search["viscosity"]).any()
     liquids = xr.load_datatree(pour.path / "pour.nc")["liquids"]
-    np.testing.assert_array_equal(liquids["viscosity"], drawn.search["viscosity"])
-    assert len(pour.chosen.fractions) % (LANDINGS_PER_DRAW * len(drawn.judge["viscosity"])) == 0
+    np.testing.assert_array_equal(liquids["viscosity"], search["viscosity"])
+    assert len(pour.chosen.fractions) % (LANDINGS_PER_DRAW * len(judge["viscosity"])) == 0
 
 
 def test_an_effect_that_does_not_act_in_pours_needs_no_new_ones(

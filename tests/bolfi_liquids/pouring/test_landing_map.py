@@ -13,7 +13,7 @@ from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.inputs.settings import PRIOR_POURS
 from bolfi_liquids.pouring.design import Box, joint_prior, whole
 from bolfi_liquids.pouring.landed_pours import Parcels, Poured, pours_in
-from bolfi_liquids.pouring.landing_map import learn_map, map_of_prior
+from bolfi_liquids.pouring.landing_map import learn_map
 from bolfi_liquids.pouring.parcels import PARCELS
 from bolfi_liquids.pouring.spillage import landing_sd
 from bolfi_liquids.simulators import PourSimulator
@@ -187,7 +187,8 @@ def test_liquids_beyond_the_box_are_taken_at_its_edge(made_up, bank):
 def test_a_map_of_all_liquids_says_what_new_pours_spill(bank):
     """Of liquids and seeds that it does not hold, as far as its own error says."""
     pours, rng = pours_of(), np.random.default_rng(5)
-    learned = map_of_prior(default_prior(), pours, PRIOR_POURS, Compute(bank=bank))
+    box = whole(joint_prior(default_prior(), (), CUPS))
+    learned = learn_map(box, CUPS, pours_in(box, pours, PRIOR_POURS, Compute(bank=bank)))
     drawn = default_prior().from_unit(rng.uniform(size=(24, 2)))
     found = learned.surface({name: np.repeat(v, 4) for name, v in drawn.items()}, rates=5)
     rate = found.angular_velocity[2]

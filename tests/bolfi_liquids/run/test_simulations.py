@@ -21,8 +21,12 @@ from bolfi_liquids.simulators import FluidSimulator
 class Made(FluidSimulator):
     """A function in place of the fluid."""
 
-    simulate: Callable
+    function: Callable
     identity: str = "line"
+    time_limit = None  # a function cannot stop itself
+
+    def simulate(self, theta, seeds):
+        return self.function(theta, seeds)
 
     @property
     def batched(self):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from ..inputs.pour_table import PourTable
+    from bolfi_liquids.inputs.pour_table import PourTable
 
 
 class Row(NamedTuple):

@@ -8,7 +8,8 @@ import pytest
 from bolfi_liquids import models
 from bolfi_liquids.inputs.bundled import bundled_pours
 from bolfi_liquids.inputs.cups import bundled_cups
-from bolfi_liquids.pouring.table_interpolation import between
+
+from .table_interpolation import between
 
 RATES = np.geomspace(0.5, 3.0, 5)
 
