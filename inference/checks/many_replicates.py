@@ -21,8 +21,8 @@ from ..arguments import (
 from ..describe import describe
 from ..prior import Prior, checked_prior
 from ..progress import progress_bar
-from ..simulations.executors import Workers, check_executor, open_executor
-from ..simulations.failures import FailureKind
+from ..simulations.executors import Workers, open_executor
+from ..simulations.failures import is_unusable
 from ..simulations.job import BATCH
 from ..types import Simulator
 from .finished_replicates import Replicates
@@ -93,7 +93,6 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     check_text("identity", identity)
     check_flag("independent", independent)
     check_flag("retry", retry)
-    check_executor(executor)
     n, seed = checked_integer("n", n), checked_integer("seed", seed, 0)
     draws = checked_integer("draws", draws)
     plan = ReplicatePlan(
@@ -197,12 +196,10 @@ def _unless_all_are_misshapen(made: Iterator[Replicate], first: int) -> Iterator
     """
     waiting: list[Replicate] | None = []
     for replicate in made:
-        failure = replicate.error
-        misshapen = failure is not None and failure.kind is FailureKind.UNUSABLE
-        if failure is not None and waiting is not None and misshapen:
+        if waiting is not None and is_unusable(replicate.error):
             waiting.append(replicate)
             if len(waiting) == first:
-                raise ValueError(f"{replicate.stage}: {failure.text}")
+                raise ValueError(f"{replicate.stage}: {replicate.error.text}")
             continue
         yield from waiting or ()
         waiting = None

@@ -2,7 +2,6 @@
 
 import json
 import logging
-import os
 import sqlite3
 import threading
 import time
@@ -17,7 +16,7 @@ import numpy as np
 from ..arguments import check_text, checked_integer
 from ..notebook_display import as_html, as_text
 from .database import disk_errors, opened_database
-from .failures import Failure, FailureKind
+from .failures import Failure, failure_columns, failure_of
 from .simulation_locks import Claims
 
 logger = logging.getLogger(__name__)
@@ -133,7 +132,7 @@ class SimulationBank:
             return None
         blob, dtype, shape, kind, text, seconds = kept
         signal = None if blob is None else _signal(blob, dtype, shape)
-        return Simulation(signal, kind and Failure(FailureKind(kind), text), seconds)
+        return Simulation(signal, failure_of(kind, text), seconds)
 
     def _is_whole(self, row: tuple, digest: bytes) -> bool:
         """Whether a row, see `_digest`, is as it was stored."""
@@ -159,9 +158,7 @@ class SimulationBank:
         if simulation.signal is not None:
             signal = np.ascontiguousarray(simulation.signal)
             blob, dtype, shape = signal.tobytes(), signal.dtype.str, json.dumps(signal.shape)
-        failure = simulation.error
-        why = (None, None) if failure is None else (failure.kind.value, failure.text)
-        seconds = float(simulation.seconds)
+        why, seconds = failure_columns(simulation.error), float(simulation.seconds)
         row = (*_key(identity, theta, seed), blob, dtype, shape, *why, seconds)
         with self._lock, disk_errors(self.path):
             self._connection.execute(
@@ -240,12 +237,6 @@ class SimulationBank:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def check_bank(bank: object) -> None:
-    """Raise ValueError unless `bank` is a bank, or a path to one."""
-    if not isinstance(bank, SimulationBank | str | os.PathLike) or not str(bank):
-        raise ValueError(f"bank must be the path of a file or a SimulationBank, got {bank!r:.100}")
 
 
 def theta_key(theta: Mapping[str, float]) -> str:
