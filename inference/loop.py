@@ -197,7 +197,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
                 "on from there"
             )
         made = engine.fit({"simulator": seconds}, warn=False)
-        if not budget and made.unreached:  # a table of losses, rather than of outputs
+        if simulate is None and made.unreached:  # a table of losses, rather than of outputs
             raise ValueError(made.unreached[0])
         for _ in range(_confirmations(engine, budget, confirm)):
             for simulation in _confirmation(engine, made, runner, confirm):

@@ -6,7 +6,6 @@ from .many_replicates import replicates as replicates
 from .one_replicate import Pipeline as Pipeline
 from .one_replicate import Replicate as Replicate
 from .pipelines import FitPipeline as FitPipeline
-from .pipelines import SharedDesign as SharedDesign
 from .pipelines import shared_design as shared_design
 from .random_points import Tarp as Tarp
 from .random_points import tarp as tarp

@@ -1,6 +1,6 @@
 """Running a pipeline many times on data whose truth is known."""
 
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import Executor, as_completed
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -16,7 +16,6 @@ from ..arguments import (
     check_text,
     check_timeout,
     checked_integer,
-    checked_number,
 )
 from ..describe import describe
 from ..prior import Prior, checked_prior
@@ -118,37 +117,6 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     ordered = [done[number] for number in range(n)]
     finished = tuple(r for r in ordered if r.error is None)
     return Replicates(prior, seed, draws, finished, tuple(r for r in ordered if r.error))
-
-
-def made_or_given(
-    of: Replicates | Pipeline,
-    simulate: Simulator | None,
-    prior: Prior | None,
-    run: Mapping[str, Any],
-) -> Replicates:
-    """Replicates as given, or made by the pipeline that was given.
-
-    Raises:
-        ValueError: replicates together with what would make them.
-    """
-    if not isinstance(of, Replicates):
-        if not callable(of):
-            raise ValueError(
-                "of must be Replicates or a pipeline, and a pipeline must be a function, "
-                f"got {of!r:.100}"
-            )
-        return replicates(of, simulate, prior, **run)
-    if simulate is not None or prior is not None or run:
-        raise ValueError(
-            "replicates are made already: give no simulator, prior or option of `replicates`, "
-            f"got {[*run] or 'simulate or prior'}"
-        )
-    return of
-
-
-def check_level(alpha: object) -> None:
-    """Raise ValueError unless `alpha` is a rate of false alarms."""
-    checked_number("alpha", alpha, lambda a: 0.0 < a < 1.0, "a number between 0 and 1")
 
 
 def _settings(plan: ReplicatePlan, prior: Prior) -> dict[str, str]:

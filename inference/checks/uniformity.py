@@ -7,12 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._lazy import stats, xr
-from ..prior import Prior
-from ..types import Simulator
 from . import bands
-from .finished_replicates import LOG_DENSITY, Quantity, Replicates, checked_quantities, table
-from .many_replicates import check_level, made_or_given
-from .one_replicate import Pipeline
+from .finished_replicates import LOG_DENSITY, Quantity, Replicates, check_judged, table
 from .ranks import bin_count, to_ranks
 
 if TYPE_CHECKING:
@@ -144,13 +140,10 @@ def _shape(name: str, ranks: np.ndarray, draws: int) -> str:
 
 
 def sbc(
-    of: Replicates | Pipeline,
-    simulate: Simulator | None = None,
-    prior: Prior | None = None,
+    made: Replicates,
     *,
     quantities: Mapping[str, Quantity] | None = None,
     alpha: float = 0.01,
-    **run: Any,
 ) -> SBC:
     """Simulation-based calibration (Talts et al. 2018; Modrák et al. 2023).
 
@@ -161,17 +154,14 @@ def sbc(
     pipeline return one, or give it as a quantity.
 
     Args:
-        of: Replicates, or a pipeline for which `replicates` makes them.
-        simulate, prior, run: Arguments of `replicates`; only with a pipeline.
+        made: What `replicates` returned.
         quantities: Further functions (theta: name -> [n], observed) -> [n] to rank.
         alpha: False alarms of `ok`.
 
     Raises:
-        ValueError: as `replicates`; or none finished.
+        ValueError: `made` is something else, none finished, or a quantity is refused.
     """
-    check_level(alpha)
-    checked_quantities(quantities)
-    made = made_or_given(of, simulate, prior, run)
+    check_judged(made, alpha)
     values = made.values(quantities) | made.log_density()
     ranks = to_ranks(made.quantiles(values), made.most)
     bins = bin_count(len(made), made.most)

@@ -119,22 +119,10 @@ def test_levels_are_checked(made):
 
 
 @pytest.mark.parametrize("check", [inference.sbc, inference.coverage, inference.tarp])
-def test_a_check_may_run_the_pipeline_itself(made, check):
-    given = {"n": 80, "draws": 31, "independent": True}
-    own = check(prior_as_posterior, simulate=silent, prior=PRIOR, **given)
-    xr.testing.assert_identical(own.to_dataset(), check(made).to_dataset())
-    in_order = check(prior_as_posterior, silent, PRIOR, **given)
-    xr.testing.assert_identical(own.to_dataset(), in_order.to_dataset())
-
-
-@pytest.mark.parametrize("check", [inference.sbc, inference.coverage, inference.tarp])
-def test_what_a_check_does_not_take_is_refused(made, check):
-    with pytest.raises(TypeError):
-        check(prior_as_posterior, silent, PRIOR, 80)
-    with pytest.raises(TypeError):
-        check(prior_as_posterior, silent, PRIOR, chains=4)
-    with pytest.raises(ValueError, match="made already"):
-        check(made, silent)
+@pytest.mark.parametrize("alpha", [0.0, 1.0, "0.01"])
+def test_a_rate_of_false_alarms_lies_between_0_and_1(made, check, alpha):
+    with pytest.raises(ValueError, match="alpha must be"):
+        check(made, alpha=alpha)
 
 
 @pytest.mark.parametrize("check", [inference.sbc, inference.coverage, inference.tarp])
