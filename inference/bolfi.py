@@ -26,7 +26,7 @@ from .history import (
     told_errors,
     told_seeds,
 )
-from .notebook_display import as_html, as_text
+from .notebook_display import Displayed
 from .prior import Prior, check_support, checked_prior
 from .result import Fit
 from .sampling.confirmation import Before
@@ -45,7 +45,7 @@ MIN_LEARN = 3  # successful simulations before the surrogate may choose
 MOST_SIMULATIONS = 8192  # of one run: the processes hold matrices of as many rows and columns
 
 
-class Bolfi:
+class Bolfi(Displayed):
     """The engine between a prior and a simulator that somebody else runs.
 
     What is asked depends only on `seed` and on the calls of `ask` and `tell` before, so a run
@@ -105,12 +105,6 @@ class Bolfi:
         self._learned: Any = None  # the family's surrogate, once there is one
         self._before: Before | None = None  # the posterior of which `confirm` drew
         self._seconds = 0.0
-
-    def __repr__(self) -> str:
-        return as_text("Bolfi", self._shown())
-
-    def _repr_html_(self) -> str:
-        return as_html("Bolfi", self._shown())
 
     def _shown(self) -> list[tuple[str, str]]:
         parameters = [f"{name} ~ {of['prior']}" for name, of in self.prior.describe().items()]

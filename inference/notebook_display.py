@@ -7,16 +7,20 @@ Rows = Sequence[tuple[str, str]]
 """(what, its value), top to bottom."""
 
 
-def as_text(title: str, rows: Rows) -> str:
-    """The title, and below it a line for each row."""
-    return "\n  ".join([title, *(f"{what}: {value}" for what, value in rows)])
+class Displayed:
+    """A value that shows its rows under the name of its type."""
 
+    def _shown(self) -> Rows:
+        raise NotImplementedError
 
-def as_html(title: str, rows: Rows) -> str:
-    """A table under its title."""
-    cells = "".join(
-        f"<tr><th style='text-align:left'>{escape(what)}</th>"
-        f"<td style='text-align:left'>{escape(value)}</td></tr>"
-        for what, value in rows
-    )
-    return f"<table><caption>{escape(title)}</caption>{cells}</table>"
+    def __repr__(self) -> str:
+        rows = (f"{what}: {value}" for what, value in self._shown())
+        return "\n  ".join([type(self).__name__, *rows])
+
+    def _repr_html_(self) -> str:
+        cells = "".join(
+            f"<tr><th style='text-align:left'>{escape(what)}</th>"
+            f"<td style='text-align:left'>{escape(value)}</td></tr>"
+            for what, value in self._shown()
+        )
+        return f"<table><caption>{escape(type(self).__name__)}</caption>{cells}</table>"

@@ -13,7 +13,7 @@ from scipy.special import ndtr
 from ._float64 import in_float64
 from .arguments import check_flag, checked_integer
 from .history import History
-from .notebook_display import as_html, as_text
+from .notebook_display import Displayed
 from .prior import Prior
 from .sampling.confirmation import Before
 from .sampling.convergence import SamplingWarning
@@ -50,8 +50,8 @@ class Closest(NamedTuple):
     discrepancy: float
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
+@dataclass(frozen=True, repr=False, eq=False)
+class Fit(Displayed):
     """Result of `fit` or `Bolfi.fit`; immutable.
 
     Attributes:
@@ -72,12 +72,6 @@ class Fit:
     settings: Mapping[str, object]
     seconds: Mapping[str, float]
     before: Before | None = None
-
-    def __repr__(self) -> str:
-        return as_text("Fit", self._shown())
-
-    def _repr_html_(self) -> str:
-        return as_html("Fit", self._shown())
 
     @in_float64
     def _shown(self) -> list[tuple[str, str]]:

@@ -144,8 +144,8 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
     with ExitStack() as stack:
         compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         advance = stack.enter_context(progress_bar("simulations", n, shown=progress))
-        asked = jobs(theta, seeds)
-        made = run_missing(pipeline.simulate, asked, compute, identity=identity, advance=advance)
+        simulator, asked = cast(Simulator, pipeline.simulate), jobs(theta, seeds)
+        made = run_missing(simulator, asked, compute, identity=identity, advance=advance)
     good = sum(result.signal is not None for result in made)
     if good < MIN_LEARN:
         first = next((result.error for result in made if result.error), "none")

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -96,32 +96,6 @@ class SBC:
         ax.set_xlabel("rank of the truth among the draws, as a fraction")
         ax.set_ylabel("ECDF − uniform")
         return finish(ax, n, **LEGEND_BELOW)
-
-    def histogram(self, axes: Any = None, level: float = 0.95) -> "list[Axes]":
-        """Binned ranks, one axes per quantity; grey holds each bar with probability `level`."""
-        from ..figures import GREY, INK, bare, some_axes
-        from .plots import BAND, colour
-
-        n, q = self.ranks.shape
-        size = (max(2.6 * q, 3.2), 2.6)
-        panels = some_axes(axes, q, "quantities", ncols=q, figsize=size, sharey=True)
-        bins = bin_count(n, self.draws)
-        low, high = stats.binom.interval(level, n, 1 / bins)
-        for j, (name, ax) in enumerate(zip(self.names, panels, strict=True)):
-            counts = np.bincount(self.ranks[:, j] * bins // (self.draws + 1), minlength=bins)
-            ax.axhspan(low, high, color=BAND, lw=0)
-            ax.axhline(n / bins, color=GREY, lw=0.8)
-            ax.stairs(
-                counts, np.linspace(0.0, 1.0, bins + 1), color=colour(j), fill=True, alpha=0.35
-            )
-            ax.stairs(counts, np.linspace(0.0, 1.0, bins + 1), color=colour(j), lw=1.2)
-            ax.set_xlim(0.0, 1.0)
-            ax.set_ylim(0.0, 1.15 * max(counts.max(), high))
-            ax.set_title(name, color=INK)
-            ax.set_xlabel("rank, as a fraction")
-            bare(ax)
-        panels[0].set_ylabel(f"replicates of {n}")
-        return panels
 
 
 def _shape(name: str, ranks: np.ndarray, draws: int) -> str:

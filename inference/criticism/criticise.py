@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import check_function, check_kind, checked_integer, checked_number, is_table
-from ..notebook_display import as_html, as_text
+from ..notebook_display import Displayed
 from ..prior import Prior, checked_prior
 from ..simulations.bank import SimulationBank
 from ..simulations.compute import open_compute
@@ -31,7 +31,7 @@ from .verdict import REJECTION_LEVEL, Candidate, Verdict, VerdictKind, conclude,
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Criticism:
+class Criticism(Displayed):
     """Verdict on a model, its tests, and the explanations that were tried.
 
     Attributes:
@@ -67,12 +67,6 @@ class Criticism:
     units: Mapping[str, str]
     tied: tuple[tuple[str, ...], ...]
     simulations: int
-
-    def __repr__(self) -> str:
-        return as_text("Criticism", self._shown())
-
-    def _repr_html_(self) -> str:
-        return as_html("Criticism", self._shown())
 
     def _shown(self) -> list[tuple[str, str]]:
         sizes = [

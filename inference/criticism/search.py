@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .clean_scores import scored_on_clean
 from .hypothesis import Hypothesis
 from .misfit import Check
 from .prior_boxes import (
@@ -20,7 +19,7 @@ from .prior_boxes import (
     with_whole_priors,
 )
 from .runs import Runs, joined
-from .signatures import Signature, signature
+from .signatures import Signature, scored_on_clean, signature
 from .study import MIN_EFFECT_RUNS, AllRunsFailed, Study
 from .verdict import FAR_BEHIND, TIE_MARGIN, Candidate, near_best
 

@@ -13,7 +13,14 @@ from .._float64 import in_float64
 from .._lazy import stats
 from ..arguments import checked_array, checked_number
 from ..surrogates.measurement_noise import Layout
-from .measurement_noise import Noise, SumOfNoises, gaussian, samples, stationary
+from .measurement_noise import (
+    Noise,
+    SumOfNoises,
+    check_noise,
+    gaussian,
+    samples,
+    stationary,
+)
 
 REPEATED = 0.85
 """Correlation of a simulator's errors in two repetitions of one experiment. Of the stirs of the
@@ -281,10 +288,7 @@ def _check_clean(clean: Sequence[CleanData]) -> None:
             raise ValueError(f"clean data set {k} must not be infinite; NaN is a missing sample")
         if not np.isfinite(residual).any():
             raise ValueError(f"clean data set {k} has no finite value; leave it out")
-        if not hasattr(noise, "covariance"):
-            raise ValueError(
-                f"noises[{k}] must be a Noise, such as KnownNoise(0.01), got {noise!r:.100}"
-            )
+        check_noise(f"noises[{k}]", noise)
     if len(shapes) > 1:
         raise ValueError(
             f"repetitions of one experiment must be of one shape, got {sorted(shapes)}"

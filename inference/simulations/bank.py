@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import check_text, checked_integer
-from ..notebook_display import as_html, as_text
+from ..notebook_display import Displayed
 from .database import disk_errors, opened_database
 from .failures import Failure, failure_columns, failure_of
 from .simulation_locks import Claims
@@ -56,7 +56,7 @@ class Simulations(NamedTuple):
     seeds: np.ndarray  # int64 [n]
 
 
-class SimulationBank:
+class SimulationBank(Displayed):
     """Finished simulations by simulator identity, theta and seed, in one SQLite file.
 
     What was simulated depends on no observation, so runs and observations may share a bank,
@@ -93,12 +93,6 @@ class SimulationBank:
         if self.in_memory:
             return "Finished simulations are not kept, because the bank is in memory"
         return f"Finished simulations are kept in {self.path}"
-
-    def __repr__(self) -> str:
-        return as_text("SimulationBank", self._shown())
-
-    def _repr_html_(self) -> str:
-        return as_html("SimulationBank", self._shown())
 
     def _shown(self) -> list[tuple[str, str]]:
         try:

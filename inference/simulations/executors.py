@@ -91,7 +91,7 @@ def _forks(pool: ProcessPoolExecutor) -> bool:
 
 
 @contextmanager
-def _dask_client(address: str) -> Iterator[DaskClient]:
+def _dask_client(address: str) -> Iterator[Any]:
     """A client of the scheduler there, closed afterwards."""
     try:
         from distributed import Client  # pyright: ignore[reportMissingImports]

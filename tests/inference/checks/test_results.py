@@ -151,14 +151,6 @@ def test_figures_show_every_quantity(made, tmp_path):
         assert result.plot().get_xlabel()
         words = [text.get_text() for text in ax.get_legend().get_texts()]
         assert set(getattr(result, "names", ())) <= set(words)
-    panels = checks[0].histogram()
-    assert [panel.get_title() for panel in panels] == ["a", "b", "log_density"]
-    for panel, ranks in zip(panels, checks[0].ranks.T, strict=True):
-        bars = panel.patches[-1].get_data().values
-        binned = np.histogram(ranks, len(bars), (-0.5, 31.5))[0]
-        np.testing.assert_array_equal(bars, binned)
-    with pytest.raises(ValueError, match="one for each of 3"):
-        checks[0].histogram(axes[:2])
     figure.savefig(tmp_path / "f.png")
 
 

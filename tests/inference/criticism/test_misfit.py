@@ -7,10 +7,10 @@ import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference._float64 import in_float64
-from bolfi_liquids.inference.criticism.clean_scores import scored_on_clean
 from bolfi_liquids.inference.criticism.measurement_noise import gaussian, samples
 from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws
 from bolfi_liquids.inference.criticism.search import examine
+from bolfi_liquids.inference.criticism.signatures import scored_on_clean
 from bolfi_liquids.inference.criticism.study import Study
 from bolfi_liquids.inference.criticism.usual_residual import REPEATED
 from bolfi_liquids.inference.simulations import Compute
