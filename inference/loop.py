@@ -23,7 +23,7 @@ from .arguments import (
 from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
 from .prior import Prior
 from .progress import progress_bar
-from .result import MUCH_DOUBT, Fit
+from .result import MUCH_DOUBT, Fit, Recipe
 from .simulations.bank import Simulation, SimulationBank
 from .simulations.compute import open_compute
 from .simulations.executors import Workers
@@ -171,6 +171,12 @@ def fit(  # noqa: PLR0913  the one call that most users make
         initial=initial,
         **options,
     )
+    simulator: Any = simulate if vectorised else OneByOne(cast(SingleSimulator, simulate))
+    if simulate is not None:
+        own = {"surrogate": engine.family, "acquisition": acquisition, "initial": engine.initial}
+        own |= {"batch": batch, "in_rounds": in_rounds, "confirm": confirm, "timeout": timeout}
+        own |= {} if earlier is None else {"earlier": earlier}
+        engine.recipe = Recipe(simulator, identity, budget, own)
     if earlier is not None:
         engine.tell(*earlier)
     if budget + engine.told < engine.initial:
@@ -181,7 +187,6 @@ def fit(  # noqa: PLR0913  the one call that most users make
     with ExitStack() as stack:
         compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         advance = stack.enter_context(progress_bar("simulations", budget + confirm, shown=progress))
-        simulator: Any = simulate if vectorised else OneByOne(cast(SingleSimulator, simulate))
         runner = stack.enter_context(Runner(simulator, compute, identity))
         schedule = _in_rounds if in_rounds else _in_flight
         finished = schedule(engine, runner, budget, batch)

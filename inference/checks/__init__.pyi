@@ -3,6 +3,8 @@ from .finished_replicates import Replicates as Replicates
 from .intervals import Coverage as Coverage
 from .intervals import coverage as coverage
 from .many_replicates import replicates as replicates
+from .of_fit import FitCheck as FitCheck
+from .of_fit import check_fit as check_fit
 from .one_replicate import Pipeline as Pipeline
 from .one_replicate import Replicate as Replicate
 from .pipelines import FitPipeline as FitPipeline

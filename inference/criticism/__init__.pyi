@@ -17,6 +17,7 @@ from .misfit import Found as Found
 from .misfit import Window as Window
 from .model_extension import Extension as Extension
 from .next_experiment import Suggestion as Suggestion
+from .of_fit import criticise_fit as criticise_fit
 from .posterior import weighted_posterior as weighted_posterior
 from .study import Plan as Plan
 from .study import Report as Report
