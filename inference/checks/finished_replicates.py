@@ -163,6 +163,20 @@ class Replicates:
         return xr.Dataset(variables, {"replicate": self.index}, attributes)
 
 
+class Judged:
+    """The result of a check; it is `ok` unless it warns."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings about the pipeline."""
+        raise NotImplementedError
+
+    @property
+    def ok(self) -> bool:
+        """No warning."""
+        return not self.warnings
+
+
 def check_judged(made: object, alpha: object) -> None:
     """Raise ValueError unless these are replicates and a rate of false alarms."""
     check_kind("made", made, Replicates)

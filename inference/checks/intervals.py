@@ -8,7 +8,7 @@ import numpy as np
 
 from .._lazy import stats, xr
 from ..arguments import checked_array
-from .finished_replicates import Quantity, Replicates, check_judged, table
+from .finished_replicates import Judged, Quantity, Replicates, check_judged, table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +19,7 @@ DRAWN_LEVELS = 100  # at which the curve of a figure is drawn
 
 
 @dataclass(frozen=True, eq=False)
-class Coverage:
+class Coverage(Judged):
     """Numbers of R central intervals that held the truth.
 
     Attributes:
@@ -51,15 +51,13 @@ class Coverage:
     def low(self) -> np.ndarray:
         """Lower end of the exact 99 % interval of the rate (Clopper and Pearson 1934), [k, q]."""
         n, tail = len(self.replicates), (1 - CONFIDENCE) / 2
-        some = stats.beta.ppf(tail, np.maximum(self.covered, 1), n - self.covered + 1)
-        return np.where(self.covered > 0, some, 0.0)
+        return np.nan_to_num(stats.beta.ppf(tail, self.covered, n - self.covered + 1), nan=0.0)
 
     @property
     def high(self) -> np.ndarray:
         """Upper end, [k, q]."""
         n, tail = len(self.replicates), (1 - CONFIDENCE) / 2
-        some = stats.beta.ppf(1 - tail, self.covered + 1, np.maximum(n - self.covered, 1))
-        return np.where(self.covered < n, some, 1.0)
+        return np.nan_to_num(stats.beta.ppf(1 - tail, self.covered + 1, n - self.covered), nan=1.0)
 
     @property
     def noticed(self) -> np.ndarray:
@@ -81,11 +79,6 @@ class Coverage:
             for i, (level, p) in enumerate(zip(self.levels, self.p_values[:, j], strict=True))
             if p < limit
         ]
-
-    @property
-    def ok(self) -> bool:
-        """No warning."""
-        return not self.warnings
 
     def __str__(self) -> str:
         rows = [

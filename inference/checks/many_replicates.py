@@ -1,6 +1,6 @@
 """Running a pipeline many times on data whose truth is known."""
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator
 from concurrent.futures import Executor, as_completed
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -80,7 +80,7 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     Raises:
         ValueError: bad argument; a store made with other settings; a pipeline that returns
             something of the wrong form, or a simulator that does so in all of the first
-            replicates, which are not kept then.
+            replicates. Replicates of which it does so are not kept.
     """
     check_function("pipeline", pipeline)
     simulator = _own(pipeline, "simulate", simulate)
@@ -110,8 +110,14 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
         advance = stack.enter_context(progress_bar("replicates", n, shown=progress, done=len(done)))
         missing = [number for number in range(n) if number not in done]
         with closing(_run(plan, missing, truths, workers)) as made:
-            for replicate in _unless_all_are_misshapen(made, BATCH):
-                kept.put(replicate)
+            unusable = 0
+            for ran, replicate in enumerate(made, 1):
+                if not is_unusable(replicate.error):
+                    kept.put(replicate)
+                else:  # the next call tries it again
+                    unusable += 1
+                    if unusable == ran == BATCH:  # all would fail in the same way
+                        raise ValueError(f"{replicate.stage}: {replicate.error.text}")
                 done[replicate.number] = replicate
                 advance(1)
     ordered = [done[number] for number in range(n)]
@@ -154,22 +160,3 @@ def _run(
     finally:
         for future in futures:
             future.cancel()  # after a mistake or Ctrl-C there is no use in the rest
-
-
-def _unless_all_are_misshapen(made: Iterator[Replicate], first: int) -> Iterator[Replicate]:
-    """The same replicates; those whose simulator returned no signal wait until another comes.
-
-    Raises:
-        ValueError: none came among the first; all would fail in the same way.
-    """
-    waiting: list[Replicate] | None = []
-    for replicate in made:
-        if waiting is not None and is_unusable(replicate.error):
-            waiting.append(replicate)
-            if len(waiting) == first:
-                raise ValueError(f"{replicate.stage}: {replicate.error.text}")
-            continue
-        yield from waiting or ()
-        waiting = None
-        yield replicate
-    yield from waiting or ()

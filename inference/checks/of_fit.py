@@ -9,6 +9,7 @@ import numpy as np
 from ..criticism.measurement_noise import Noise, samples
 from ..criticism.of_fit import noise_of
 from ..result import Fit
+from .finished_replicates import Judged
 from .intervals import Coverage, coverage
 from .many_replicates import replicates
 from .one_replicate import Observe
@@ -18,7 +19,7 @@ from .uniformity import SBC, sbc
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class FitCheck:
+class FitCheck(Judged):
     """Three checks of the same replicates.
 
     Attributes:
@@ -36,11 +37,6 @@ class FitCheck:
         """Warnings about the pipeline, each once."""
         parts = (self.sbc, self.coverage, self.tarp)
         return list(dict.fromkeys(warning for part in parts for warning in part.warnings))
-
-    @property
-    def ok(self) -> bool:
-        """No warning."""
-        return not self.warnings
 
     def __repr__(self) -> str:
         return "\n\n".join(map(str, (self.sbc, self.coverage, self.tarp)))

@@ -7,7 +7,7 @@ import numpy as np
 
 from .._lazy import stats, xr
 from . import bands
-from .finished_replicates import Replicates, check_judged, table
+from .finished_replicates import Judged, Replicates, check_judged, table
 from .ranks import quantiles, to_ranks
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ CONFIDENCE = 0.95  # of the bootstrap band
 
 
 @dataclass(frozen=True, eq=False)
-class Tarp:
+class Tarp(Judged):
     """Expected coverage probability against credibility.
 
     Attributes:
@@ -61,11 +61,6 @@ class Tarp:
                 f"diagonal {self.atc:+.3f}; negative: draws too narrow, positive: too wide)",
             ]
         return said
-
-    @property
-    def ok(self) -> bool:
-        """No warning."""
-        return not self.warnings
 
     def __str__(self) -> str:
         row = [f"{self.ecdf:.3g}", f"{self.kolmogorov_smirnov:.3g}", f"{self.atc:+.3f}"]

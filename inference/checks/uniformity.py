@@ -8,7 +8,7 @@ import numpy as np
 
 from .._lazy import stats, xr
 from . import bands
-from .finished_replicates import LOG_DENSITY, Quantity, Replicates, check_judged, table
+from .finished_replicates import LOG_DENSITY, Judged, Quantity, Replicates, check_judged, table
 from .ranks import bin_count, to_ranks
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ NAMED_SHAPE_Z = 3.0  # standard errors from which a shape of the ranks is named
 
 
 @dataclass(frozen=True, eq=False)
-class SBC:
+class SBC(Judged):
     """Ranks of R truths among their draws, and how well they agree with uniform ones.
 
     Attributes:
@@ -52,11 +52,6 @@ class SBC:
             for name, p, ranks in zip(self.names, least, self.ranks.T, strict=True)
             if p < limit
         ]
-
-    @property
-    def ok(self) -> bool:
-        """No warning."""
-        return not self.warnings
 
     def __str__(self) -> str:
         rows = [

@@ -211,11 +211,11 @@ class SimulationBank(Displayed):
         A claim lasts until `release`, or until the process ends. Look into the bank again after
         taking one: the last claimant may just have finished.
         """
-        return self._claims.take(_claim_key(identity, theta, seed))
+        return self._claims.take(json.dumps(_key(identity, theta, seed)))
 
     def release(self, identity: str, theta: Mapping[str, float], seed: int) -> None:
         """End a claim; nothing happens if there is none."""
-        self._claims.give_back(_claim_key(identity, theta, seed))
+        self._claims.give_back(json.dumps(_key(identity, theta, seed)))
 
     def __len__(self) -> int:
         with self._lock:
@@ -233,27 +233,18 @@ class SimulationBank(Displayed):
         self.close()
 
 
-def theta_key(theta: Mapping[str, float]) -> str:
-    """Canonical text of theta; `repr` of a float64 round-trips exactly.
-
-    Raises:
-        ValueError: not names and numbers.
-    """
-    try:
-        return json.dumps({name: float(theta[name]) for name in sorted(theta)})
-    except (TypeError, ValueError, KeyError) as error:
-        raise ValueError(f"theta must map names to numbers, got {theta!r:.100}") from error
-
-
 def _key(identity: str, theta: Mapping[str, float], seed: int) -> tuple[str, str, int]:
-    """What a row is found by.
+    """Identity, canonical text of theta (`repr` of a float64 round-trips exactly) and seed.
 
     Raises:
         ValueError: no text, no names and numbers, or no integer.
     """
     check_text("identity", identity)
     whole = checked_integer("seed", seed, -LARGEST_SEED - 1, LARGEST_SEED)
-    return identity, theta_key(theta), whole
+    try:
+        return identity, json.dumps({name: float(theta[name]) for name in sorted(theta)}), whole
+    except (TypeError, ValueError, KeyError) as error:
+        raise ValueError(f"theta must map names to numbers, got {theta!r:.100}") from error
 
 
 def _digest(row: tuple) -> bytes:
@@ -264,7 +255,3 @@ def _digest(row: tuple) -> bytes:
 
 def _signal(blob: bytes, dtype: str, shape: str) -> np.ndarray:
     return np.frombuffer(blob, np.dtype(dtype)).reshape(json.loads(shape)).copy()
-
-
-def _claim_key(identity: str, theta: Mapping[str, float], seed: int) -> str:
-    return json.dumps(_key(identity, theta, seed))

@@ -52,8 +52,7 @@ class Runner:
     def __init__(self, simulate: Simulator, compute: Compute, identity: str = ""):
         neutral_of(simulate)  # refused now, not by a worker
         self.simulate = simulate
-        self._misshapen_until = BATCH  # results, whatever the batch; 0 once another came
-        self._misshapen = 0
+        self._results = self._unusable = 0
         self._resources = ExitStack()
         own = SimulationBank() if compute.bank is None else nullcontext(compute.bank)
         self.bank = self._resources.enter_context(own)
@@ -113,18 +112,12 @@ class Runner:
             wait([outcome], timeout=POLL_SECONDS)
             self._begin()
         made = outcome.result()
-        self._check_first(made)
+        self._results += 1
+        if is_unusable(made.error):
+            self._unusable += 1
+            if self._unusable == self._results == BATCH:
+                raise NoSignals(made.error.text)
         return made
-
-    def _check_first(self, made: Simulation) -> None:
-        if not self._misshapen_until:
-            return
-        if not is_unusable(made.error):
-            self._misshapen_until = 0
-            return
-        self._misshapen += 1
-        if self._misshapen == self._misshapen_until:
-            raise NoSignals(made.error.text)
 
     def _begin(self) -> None:
         """Take from the bank or simulate whatever nobody else is simulating."""
