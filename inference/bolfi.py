@@ -376,7 +376,7 @@ class Bolfi(Displayed):
             settings=self.settings,
             seconds={"simulator": 0.0, **measured, "engine": self._seconds},
             before=self._before,
-            recipe=self.recipe,
+            made_by=self.recipe,
         )
         if warn:
             complain(made.warnings, stacklevel + 1)

@@ -82,8 +82,8 @@ class Fit(Displayed):
         settings: How the run was made.
         seconds: Time in the "simulator" and in the "engine" [s].
         before: The posterior of which `Bolfi.confirm` drew last; None where it never did.
-        recipe: How it was made; None if not by `fit`, or without a simulator, or if the fit was
-            pickled, for simulators may not be.
+        made_by: How; None if not by `fit`, or without a simulator, or if the fit was pickled, for
+            simulators may not be.
     """
 
     prior: Prior
@@ -94,10 +94,24 @@ class Fit(Displayed):
     settings: Mapping[str, object]
     seconds: Mapping[str, float]
     before: Before | None = None
-    recipe: Recipe | None = None
+    made_by: Recipe | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "recipe": None}
+        return {**self.__dict__, "made_by": None}
+
+    @property
+    def recipe(self) -> Recipe:
+        """How it was made.
+
+        Raises:
+            ValueError: that is not known, see `made_by`.
+        """
+        if self.made_by is None:
+            raise ValueError(
+                "the fit has no simulator: `fit` did not make it, or it was pickled; give the "
+                "simulator to inference.replicates or criticism.criticise"
+            )
+        return self.made_by
 
     @in_float64
     def _shown(self) -> list[tuple[str, str]]:

@@ -84,11 +84,6 @@ def check_fit(
         ValueError: the fit has no recipe, its noise cannot be drawn, or an argument is bad.
     """
     recipe = fit.recipe
-    if recipe is None:
-        raise ValueError(
-            "the fit has no simulator, for `fit` did not make it, or it was pickled; use "
-            "inference.replicates with a FitPipeline"
-        )
     if observe is None:
         estimated = getattr(recipe.options["surrogate"], "noise", None) is None
         noise = None if estimated else noise_of(fit)

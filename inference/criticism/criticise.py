@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -213,13 +213,13 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     with open_compute(executor, timeout, batch, bank) as compute:
         study = Study(experiment, prior, extensions, compute, plan or Plan(), seed, counted)
         base, untested = examine(study, None if earlier is None else study.table(*earlier))
-        tried = Tried([], [], ())
+        candidates, members = [], []
         if accept is not None or base.check.p_value < level:
-            tried = _try(study, base, accept, held_out)
-        verdict = conclude(base.check, tried.members, level)
-        suggestions = suggest(study, proposals, _rivals(verdict, tried))
+            candidates, members = _try(study, base, accept, held_out)
+        verdict = conclude(base.check, members, level)
+        suggestions = suggest(study, proposals, _rivals(verdict, candidates, members))
     accepted = tuple(accept) if accept is not None else _named(verdict)
-    leading = _among(tried.candidates, accepted)
+    leading = _among(candidates, accepted)
     extended = leading.hypothesis if leading else None
     left = []
     if extended is not None:
@@ -229,41 +229,29 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         verdict=verdict,
         accepted=accepted,
         base=base,
-        candidates=tuple(tried.candidates),
+        candidates=tuple(candidates),
         extended=extended,
         posterior=weighted_posterior(extended or base.hypothesis, seed),
         before=tuple(locate(base.hypothesis, experiment.windows, base.null)),
         after=tuple(left),
         suggestions=tuple(suggestions),
-        untested=tuple(
-            dict.fromkeys((*untested, *_left_out(tried.candidates), *tried.unpredicted))
-        ),
+        untested=tuple(dict.fromkeys((*untested, *_left_out(candidates)))),
         observed=experiment.observed,
         noise=experiment.noise,
         units={name: one.unit for name, one in extensions.items()},
-        tied=tuple(one.names for one in tied(tried.members)),
+        tied=tuple(one.names for one in tied(members)),
         simulations=count,
     )
 
 
-class Tried(NamedTuple):
-    """Explanations that were tried.
-
-    Attributes:
-        candidates: All of them.
-        members: Those of them that passed.
-        unpredicted: Effects of explanations that could not be simulated for the held-out data.
-    """
-
-    candidates: list[Candidate]
-    members: list[Candidate]
-    unpredicted: tuple[str, ...]
-
-
 def _try(
     study: Study, base: Base, accept: Sequence[str] | None, held_out: Sequence[Experiment]
-) -> Tried:
-    """Fit explanations, and test those that passed on the held-out data."""
+) -> tuple[list[Candidate], list[Candidate]]:
+    """Fit explanations, and test those that passed on the held-out data.
+
+    Returns:
+        All of them; and those that passed, but for what cannot be simulated for held-out data.
+    """
     candidates, members = explain(study, base, accept)
     passed = [one.names for one in members]
     accepted = _among(candidates, accept)
@@ -275,22 +263,26 @@ def _try(
         replace(one, gaps=gaps.get(one.names, ()), predicted=one.names not in failed)
         for one in candidates
     ]
-    borne = [one for one in judged if one.names in passed and one.predicted]
-    return Tried(judged, borne, tuple(dict.fromkeys(sum(failed, ()))))
+    return judged, [one for one in judged if one.names in passed and one.predicted]
 
 
-def _rivals(verdict: Verdict, tried: Tried) -> list[Candidate]:
+def _rivals(
+    verdict: Verdict, candidates: Sequence[Candidate], members: Sequence[Candidate]
+) -> list[Candidate]:
     """Explanations that a further experiment should tell apart."""
     if verdict.kind is VerdictKind.TIE:
-        return tied(tried.members)
+        return tied(members)
     if verdict.kind is VerdictKind.UNKNOWN:
-        return sorted(tried.candidates, key=lambda c: -c.gain)[:2]
+        return sorted(candidates, key=lambda c: -c.gain)[:2]
     return []
 
 
 def _left_out(candidates: Sequence[Candidate]) -> list[str]:
-    """Effects that alone would pass the test, but that were not refitted."""
-    return [c.names[0] for c in candidates if len(c.names) == 1 and c.passes and not c.refitted]
+    """Effects that alone would pass the test but were not refitted, and those of explanations that
+    could not be simulated for held-out data."""
+    alone = [c for c in candidates if len(c.names) == 1 and c.passes and not c.refitted]
+    unpredicted = [c for c in candidates if not c.predicted]
+    return [name for c in (*alone, *unpredicted) for name in c.names]
 
 
 def _named(verdict: Verdict) -> tuple[str, ...]:

@@ -38,11 +38,6 @@ def criticise_fit(
     Raises:
         ValueError: the fit has no recipe, its noise is not known, or an argument is bad.
     """
-    if fit.recipe is None:
-        raise ValueError(
-            "the fit has no simulator, for `fit` did not make it, or it was pickled; use "
-            "criticism.criticise with an Experiment"
-        )
     recipe, found = fit.recipe, noise_of(fit) if noise is None else noise
     if found is None:
         raise ValueError(
@@ -62,7 +57,7 @@ def noise_of(fit: Fit) -> Noise | None:
     """The measurement noise that a fit was given, or estimated; None where draws of it cannot be
     made of that: of a summary, by the mean, of an estimate over several channels or of averages.
     """
-    family = None if fit.recipe is None else fit.recipe.options["surrogate"]
+    family = fit.recipe.options["surrogate"]
     given = getattr(family, "noise", None)
     if getattr(family, "summary", None) is not None:
         return None
