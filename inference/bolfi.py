@@ -28,7 +28,7 @@ from .history import (
 )
 from .notebook_display import Displayed
 from .prior import Prior, check_support, checked_prior
-from .result import Fit
+from .result import Fit, Recipe
 from .sampling.confirmation import Before
 from .simulations.failures import Failure, FailureKind, unusable
 from .simulations.job import BATCH
@@ -103,6 +103,7 @@ class Bolfi(Displayed):
         self._learned: Any = None  # the family's surrogate, once there is one
         self._before: Before | None = None  # the posterior of which `confirm` drew
         self._seconds = 0.0
+        self.recipe: Recipe | None = None  # of `fit`, where that drives the engine
 
     def _shown(self) -> list[tuple[str, str]]:
         parameters = [f"{name} ~ {of['prior']}" for name, of in self.prior.describe().items()]
@@ -376,6 +377,7 @@ class Bolfi(Displayed):
             settings=self.settings,
             seconds={"simulator": 0.0, **measured, "engine": self._seconds},
             before=self._before,
+            made_by=self.recipe,
         )
         if warn:
             complain(made.warnings, stacklevel + 1)

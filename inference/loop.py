@@ -23,7 +23,7 @@ from .arguments import (
 from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
 from .prior import Prior
 from .progress import progress_bar
-from .result import MUCH_DOUBT, Fit
+from .result import MUCH_DOUBT, Fit, Recipe
 from .simulations.bank import Simulation, SimulationBank
 from .simulations.compute import open_compute
 from .simulations.executors import Workers
@@ -178,6 +178,11 @@ def fit(  # noqa: PLR0913  the one call that most users make
         initial=initial,
         **options,
     )
+    if simulate is not None:
+        own = {"surrogate": engine.family, "acquisition": acquisition, "initial": engine.initial}
+        own |= {"batch": batch, "in_rounds": in_rounds, "confirm": confirm, "timeout": timeout}
+        own |= {} if earlier is None else {"earlier": earlier}
+        engine.recipe = Recipe(simulator, identity, budget, own)
     if earlier is not None:
         engine.tell(*earlier)
     if budget + engine.told < engine.initial:
@@ -203,7 +208,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
                 "on from there"
             )
         made = engine.fit({"simulator": seconds}, warn=False)
-        if not budget and made.learned.unreached:  # a table of losses, rather than of outputs
+        if simulate is None and made.learned.unreached:  # a table of losses, not of outputs
             raise ValueError(made.learned.unreached[0])
         for _ in range(_confirmations(engine, budget, confirm)):
             for simulation in _confirmation(engine, made, runner, confirm):

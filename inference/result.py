@@ -28,15 +28,35 @@ from .surrogates.warnings import (
     history_warnings,
     unconfirmed_warnings,
 )
-from .types import Theta
+from .types import Simulator, Theta
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
+    from .checks import FitCheck
+    from .criticism import Criticism
+    from .criticism.model_extension import Extensions
+
 LEAST_EFFECTIVE = 32.0  # points of a population that stand for a posterior
 MUCH_DOUBT = 1.5  # see `Fit.doubt`: beyond it more is simulated, and a fit warns
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
+
+
+class Recipe(NamedTuple):
+    """How `fit` made a fit.
+
+    Attributes:
+        simulate: The simulator, of batches.
+        identity: Its name in a bank.
+        budget: Simulations in all.
+        options: Other arguments of `fit` that the result depends on; "surrogate" is a family.
+    """
+
+    simulate: Simulator
+    identity: str
+    budget: int
+    options: Mapping[str, Any]
 
 
 class Closest(NamedTuple):
@@ -59,6 +79,8 @@ class Fit(Displayed):
         settings: How the run was made.
         seconds: Time in the "simulator" and in the "engine" [s].
         before: The posterior of which `Bolfi.confirm` drew last; None where it never did.
+        made_by: How; None if not by `fit`, or without a simulator, or if the fit was pickled, for
+            simulators may not be.
     """
 
     prior: Prior
@@ -69,6 +91,24 @@ class Fit(Displayed):
     settings: Mapping[str, object]
     seconds: Mapping[str, float]
     before: Before | None = None
+    made_by: Recipe | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "made_by": None}
+
+    @property
+    def recipe(self) -> Recipe:
+        """How it was made.
+
+        Raises:
+            ValueError: that is not known, see `made_by`.
+        """
+        if self.made_by is None:
+            raise ValueError(
+                "the fit has no simulator: `fit` did not make it, or it was pickled; give the "
+                "simulator to inference.replicates or criticism.criticise"
+            )
+        return self.made_by
 
     @in_float64
     def _shown(self) -> list[tuple[str, str]]:
@@ -317,6 +357,39 @@ class Fit(Displayed):
             **{f"seconds_{part}": spent for part, spent in seconds.items()},
         }
         return finished(tree, attributes)
+
+    def check(self, n: int = 200, **how: Any) -> "FitCheck":
+        """Ranks and coverage of the pipeline that made this fit, on n data sets of known truth.
+
+        Each truth is drawn from the prior, and its data are simulated, fitted and sampled as these
+        data were, with as many simulations.
+
+        Args:
+            n: Data sets.
+            how: See `checks.check_fit`.
+
+        Raises:
+            ValueError: the fit has no `recipe`, or an argument is bad.
+        """
+        from .checks import check_fit
+
+        return check_fit(self, n, **how)
+
+    def criticise(self, extensions: "Extensions", **how: Any) -> "Criticism":
+        """Where simulator and data disagree, and which of the extensions explains it.
+
+        The simulations of this fit are those of the base model, whatever the surrogate.
+
+        Args:
+            extensions: What the simulator may lack, by name.
+            how: See `criticism.criticise_fit`.
+
+        Raises:
+            ValueError: the fit has no `recipe`, its noise is not known, or an argument is bad.
+        """
+        from .criticism import criticise_fit
+
+        return criticise_fit(self, extensions, **how)
 
     def plot_search(self, ax: "Axes | None" = None) -> "Axes":
         """Discrepancy of every simulation by the round in which it was asked.

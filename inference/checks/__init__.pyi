@@ -3,10 +3,11 @@ from .finished_replicates import Replicates as Replicates
 from .intervals import Coverage as Coverage
 from .intervals import coverage as coverage
 from .many_replicates import replicates as replicates
+from .of_fit import FitCheck as FitCheck
+from .of_fit import check_fit as check_fit
 from .one_replicate import Pipeline as Pipeline
 from .one_replicate import Replicate as Replicate
 from .pipelines import FitPipeline as FitPipeline
-from .pipelines import SharedDesign as SharedDesign
 from .pipelines import shared_design as shared_design
 from .random_points import Tarp as Tarp
 from .random_points import tarp as tarp

@@ -1,6 +1,7 @@
 """A pipeline's draws, whatever they come in, and how many of them are independent."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -57,13 +58,10 @@ def effective_size(draws: np.ndarray) -> float:
     total = draws.shape[0] * draws.shape[1]
     if draws.shape[1] < MIN_DRAWS:
         return float(total)
-    sizes = [float(total)]
-    for column in np.moveaxis(draws, -1, 0):
-        if np.ptp(column) == 0.0:
-            return 1.0
-        bulk = array_stats().ess(column, method="bulk")
-        tail = array_stats().ess(column, method="tail", prob=(0.1, 0.9))
-        sizes += [np.asarray(bulk).item(), np.asarray(tail).item()]
+    if (np.ptp(draws, axis=(0, 1)) == 0.0).any():
+        return 1.0
+    ess = partial(array_stats().ess, draws, chain_axis=0, draw_axis=1)
+    sizes = [total, *ess(method="bulk"), *ess(method="tail", prob=(0.1, 0.9))]
     return max(1.0, float(np.nanmin(sizes)))
 
 

@@ -7,7 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._lazy import xr
-from ..arguments import check_function, checked_array, checked_mapping
+from ..arguments import (
+    check_function,
+    check_kind,
+    checked_array,
+    checked_mapping,
+    checked_number,
+)
 from ..prior import Prior
 from .one_replicate import Replicate, as_theta
 from .ranks import quantiles
@@ -56,7 +62,14 @@ class Replicates:
 
     @property
     def truth(self) -> np.ndarray:
-        """[R, d], natural units."""
+        """[R, d], natural units.
+
+        Raises:
+            ValueError: nothing finished.
+        """
+        if not self.finished:
+            first = next(iter(self.errors.values()), "none was run")
+            raise ValueError(f"no replicate finished, so nothing can be checked: {first}")
         return np.stack([r.truth for r in self.finished])
 
     @property
@@ -81,14 +94,12 @@ class Replicates:
             ValueError: nothing finished; a name that is taken; a value that is no number or
                 of the wrong shape.
         """
-        given = checked_quantities(quantities)
-        if not self.finished:
-            first = next(iter(self.errors.values()), "none was run")
-            raise ValueError(f"no replicate finished, so nothing can be checked: {first}")
+        given = checked_mapping("quantities", quantities, "functions")
         truth, draws = self.truth, self.draws
         names = self.prior.names
         found = {name: (truth[:, j], draws[..., j]) for j, name in enumerate(names)}
         for name, quantity in given.items():
+            check_function(f"quantities[{name!r}]", quantity)
             if name in (*names, LOG_DENSITY):
                 raise ValueError(f"quantity {name!r} has the name of another; choose a new one")
             found[name] = _split(
@@ -152,16 +163,24 @@ class Replicates:
         return xr.Dataset(variables, {"replicate": self.index}, attributes)
 
 
-def checked_quantities(quantities: Mapping[str, Quantity] | None) -> dict[str, Quantity]:
-    """Quantities as a dictionary.
+class Judged:
+    """The result of a check; it is `ok` unless it warns."""
 
-    Raises:
-        ValueError: they do not map names to functions.
-    """
-    given = checked_mapping("quantities", quantities, "functions")
-    for name, quantity in given.items():
-        check_function(f"quantities[{name!r}]", quantity)
-    return given
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings about the pipeline."""
+        raise NotImplementedError
+
+    @property
+    def ok(self) -> bool:
+        """No warning."""
+        return not self.warnings
+
+
+def check_judged(made: object, alpha: object) -> None:
+    """Raise ValueError unless these are replicates and a rate of false alarms."""
+    check_kind("made", made, Replicates)
+    checked_number("alpha", alpha, lambda a: 0.0 < a < 1.0, "a number between 0 and 1")
 
 
 def _padded(rows: np.ndarray, length: int) -> np.ndarray:

@@ -2,17 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._lazy import stats, xr
 from ..arguments import checked_array
-from ..prior import Prior
-from ..types import Simulator
-from .finished_replicates import Quantity, Replicates, checked_quantities, table
-from .many_replicates import check_level, made_or_given
-from .one_replicate import Pipeline
+from .finished_replicates import Judged, Quantity, Replicates, check_judged, table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +19,7 @@ DRAWN_LEVELS = 100  # at which the curve of a figure is drawn
 
 
 @dataclass(frozen=True, eq=False)
-class Coverage:
+class Coverage(Judged):
     """Numbers of R central intervals that held the truth.
 
     Attributes:
@@ -55,15 +51,13 @@ class Coverage:
     def low(self) -> np.ndarray:
         """Lower end of the exact 99 % interval of the rate (Clopper and Pearson 1934), [k, q]."""
         n, tail = len(self.replicates), (1 - CONFIDENCE) / 2
-        some = stats.beta.ppf(tail, np.maximum(self.covered, 1), n - self.covered + 1)
-        return np.where(self.covered > 0, some, 0.0)
+        return np.nan_to_num(stats.beta.ppf(tail, self.covered, n - self.covered + 1), nan=0.0)
 
     @property
     def high(self) -> np.ndarray:
         """Upper end, [k, q]."""
         n, tail = len(self.replicates), (1 - CONFIDENCE) / 2
-        some = stats.beta.ppf(1 - tail, self.covered + 1, np.maximum(n - self.covered, 1))
-        return np.where(self.covered < n, some, 1.0)
+        return np.nan_to_num(stats.beta.ppf(1 - tail, self.covered + 1, n - self.covered), nan=1.0)
 
     @property
     def noticed(self) -> np.ndarray:
@@ -85,11 +79,6 @@ class Coverage:
             for i, (level, p) in enumerate(zip(self.levels, self.p_values[:, j], strict=True))
             if p < limit
         ]
-
-    @property
-    def ok(self) -> bool:
-        """No warning."""
-        return not self.warnings
 
     def __str__(self) -> str:
         rows = [
@@ -145,14 +134,12 @@ class Coverage:
 
 
 def coverage(
-    of: Replicates | Pipeline,
-    simulate: Simulator | None = None,
-    prior: Prior | None = None,
+    made: Replicates,
     *,
     levels: Sequence[float] = (0.5, 0.8, 0.9, 0.95),
     quantities: Mapping[str, Quantity] | None = None,
     alpha: float = 0.01,
-    **run: Any,
+    conservative: bool = False,
 ) -> Coverage:
     """Empirical coverage of central posterior intervals.
 
@@ -162,24 +149,21 @@ def coverage(
     three trials.
 
     Args:
-        of: Replicates, or a pipeline for which `replicates` makes them.
-        simulate, prior, run: Arguments of `replicates`; only with a pipeline.
+        made: What `replicates` returned.
         levels: Nominal levels.
         quantities: Further functions (theta: name -> [n], observed) -> [n].
         alpha: False alarms of `ok`.
-        conservative: Given as True among `run`, only too little coverage is a fault, as for a
-            posterior that is wide by construction.
+        conservative: Whether only too little coverage is a fault, as for a posterior that is wide
+            by construction.
 
     Raises:
-        ValueError: as `replicates`; none finished; a level outside (0, 1).
+        ValueError: `made` is something else, none finished, a quantity is refused, or a level is
+            outside (0, 1).
     """
     nominal = checked_array("levels", levels)
     if nominal.ndim != 1 or nominal.size == 0 or not ((nominal > 0) & (nominal < 1)).all():
         raise ValueError(f"levels must lie between 0 and 1, got {levels}")
-    conservative = bool(run.pop("conservative", False))
-    check_level(alpha)
-    checked_quantities(quantities)
-    made = made_or_given(of, simulate, prior, run)
+    check_judged(made, alpha)
     values = made.values(quantities)
     quantiles = made.quantiles(values)
     covered = np.sum(2 * np.abs(quantiles - 0.5) <= nominal[:, None, None], axis=1)

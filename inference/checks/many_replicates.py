@@ -1,6 +1,6 @@
 """Running a pipeline many times on data whose truth is known."""
 
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Generator
 from concurrent.futures import Executor, as_completed
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -16,13 +16,12 @@ from ..arguments import (
     check_text,
     check_timeout,
     checked_integer,
-    checked_number,
 )
 from ..describe import describe
 from ..prior import Prior, checked_prior
 from ..progress import progress_bar
-from ..simulations.executors import Workers, check_executor, open_executor
-from ..simulations.failures import FailureKind
+from ..simulations.executors import Workers, open_executor
+from ..simulations.failures import is_unusable
 from ..simulations.job import BATCH
 from ..types import Simulator
 from .finished_replicates import Replicates
@@ -81,7 +80,7 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     Raises:
         ValueError: bad argument; a store made with other settings; a pipeline that returns
             something of the wrong form, or a simulator that does so in all of the first
-            replicates, which are not kept then.
+            replicates. Replicates of which it does so are not kept.
     """
     check_function("pipeline", pipeline)
     simulator = _own(pipeline, "simulate", simulate)
@@ -93,7 +92,6 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     check_text("identity", identity)
     check_flag("independent", independent)
     check_flag("retry", retry)
-    check_executor(executor)
     n, seed = checked_integer("n", n), checked_integer("seed", seed, 0)
     draws = checked_integer("draws", draws)
     plan = ReplicatePlan(
@@ -112,44 +110,19 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
         advance = stack.enter_context(progress_bar("replicates", n, shown=progress, done=len(done)))
         missing = [number for number in range(n) if number not in done]
         with closing(_run(plan, missing, truths, workers)) as made:
-            for replicate in _unless_all_are_misshapen(made, BATCH):
-                kept.put(replicate)
+            unusable = 0
+            for ran, replicate in enumerate(made, 1):
+                if not is_unusable(replicate.error):
+                    kept.put(replicate)
+                else:  # the next call tries it again
+                    unusable += 1
+                    if unusable == ran == BATCH:  # all would fail in the same way
+                        raise ValueError(f"{replicate.stage}: {replicate.error.text}")
                 done[replicate.number] = replicate
                 advance(1)
     ordered = [done[number] for number in range(n)]
     finished = tuple(r for r in ordered if r.error is None)
     return Replicates(prior, seed, draws, finished, tuple(r for r in ordered if r.error))
-
-
-def made_or_given(
-    of: Replicates | Pipeline,
-    simulate: Simulator | None,
-    prior: Prior | None,
-    run: Mapping[str, Any],
-) -> Replicates:
-    """Replicates as given, or made by the pipeline that was given.
-
-    Raises:
-        ValueError: replicates together with what would make them.
-    """
-    if not isinstance(of, Replicates):
-        if not callable(of):
-            raise ValueError(
-                "of must be Replicates or a pipeline, and a pipeline must be a function, "
-                f"got {of!r:.100}"
-            )
-        return replicates(of, simulate, prior, **run)
-    if simulate is not None or prior is not None or run:
-        raise ValueError(
-            "replicates are made already: give no simulator, prior or option of `replicates`, "
-            f"got {[*run] or 'simulate or prior'}"
-        )
-    return of
-
-
-def check_level(alpha: object) -> None:
-    """Raise ValueError unless `alpha` is a rate of false alarms."""
-    checked_number("alpha", alpha, lambda a: 0.0 < a < 1.0, "a number between 0 and 1")
 
 
 def _settings(plan: ReplicatePlan, prior: Prior) -> dict[str, str]:
@@ -187,24 +160,3 @@ def _run(
     finally:
         for future in futures:
             future.cancel()  # after a mistake or Ctrl-C there is no use in the rest
-
-
-def _unless_all_are_misshapen(made: Iterator[Replicate], first: int) -> Iterator[Replicate]:
-    """The same replicates; those whose simulator returned no signal wait until another comes.
-
-    Raises:
-        ValueError: none came among the first; all would fail in the same way.
-    """
-    waiting: list[Replicate] | None = []
-    for replicate in made:
-        failure = replicate.error
-        misshapen = failure is not None and failure.kind is FailureKind.UNUSABLE
-        if failure is not None and waiting is not None and misshapen:
-            waiting.append(replicate)
-            if len(waiting) == first:
-                raise ValueError(f"{replicate.stage}: {failure.text}")
-            continue
-        yield from waiting or ()
-        waiting = None
-        yield replicate
-    yield from waiting or ()

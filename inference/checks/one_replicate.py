@@ -7,9 +7,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ..arguments import Unusable, float64
-from ..simulations.failures import Failure, not_finite, raised, timed_out, unusable
-from ..simulations.job import Job, Overdue, limit_of, misshapen, within
-from ..simulations.returned import signals_of
+from ..simulations.failures import Failure, not_finite, raised, unusable
+from ..simulations.job import Job, run_batch, stacked
 from ..types import Simulator
 from .draws import effective_size, posterior_array, thin
 
@@ -88,28 +87,24 @@ def run_replicate(plan: ReplicatePlan, number: int, truth: np.ndarray) -> Replic
         seconds = time.perf_counter() - started
         return empty._replace(observed=observed, seconds=seconds, stage=stage, error=error)
 
+    theta = dict(zip(plan.names, truth.tolist(), strict=True))
+    job = Job(theta, _seed(plan.seed, number, SIMULATOR))
+    (made,) = run_batch(plan.simulate, [job], None, plan.timeout)
+    if made.error is not None:
+        return failed("simulator", made.error)
     try:
-        signal = _simulated(plan, number, truth)
-    except Overdue:
-        return failed("simulator", timed_out(plan.timeout or 0.0))
-    except Unusable as error:
-        job = Job(dict(zip(plan.names, truth.tolist(), strict=True)), _data_seed(plan, number))
-        return failed("simulator", misshapen(plan.simulate, [job], None, error))
-    except FAILURES as error:  # whatever the user's code raises costs this replicate only
-        return failed("simulator", raised(error))
-    try:
-        observed = _observed(plan, number, signal)
+        observed = _observed(plan, number, stacked([made])[0])
     except Unusable as error:
         return failed("observe", unusable(f"an array of numbers is expected, got {error.got}"))
-    except FAILURES as error:
+    except FAILURES as error:  # whatever the user's code raises costs this replicate only
         return failed("observe", raised(error))
     if not np.isfinite(observed).any():
         return failed("simulator", not_finite("no value of the signal"), observed)
     try:
-        made = plan.pipeline(observed.copy(), _seed(plan.seed, number, PIPELINE))
+        drawn = plan.pipeline(observed.copy(), _seed(plan.seed, number, PIPELINE))
     except FAILURES as error:
         return failed("pipeline", raised(error), observed)
-    drawn, log_density = made if isinstance(made, tuple) else (made, None)
+    drawn, log_density = drawn if isinstance(drawn, tuple) else (drawn, None)
     array = posterior_array(drawn, plan.names)
     if not np.isfinite(array).all():
         return failed("pipeline", not_finite("a draw"), observed)
@@ -121,21 +116,6 @@ def run_replicate(plan: ReplicatePlan, number: int, truth: np.ndarray) -> Replic
         return failed("log density", raised(error), observed)
     seconds = time.perf_counter() - started
     return Replicate(number, truth, observed, kept, densities, effective, seconds)
-
-
-def _simulated(plan: ReplicatePlan, number: int, truth: np.ndarray) -> np.ndarray:
-    # copies: a simulator may write into what it is given
-    theta = {name: truth[j : j + 1].copy() for j, name in enumerate(plan.names)}
-    seeds = np.array([_data_seed(plan, number)], np.int64)
-    return within(
-        plan.timeout,
-        lambda: signals_of(plan.simulate(theta, seeds), 1, None)[0],
-        limit_of(plan.simulate),
-    )
-
-
-def _data_seed(plan: ReplicatePlan, number: int) -> int:
-    return _seed(plan.seed, number, SIMULATOR)
 
 
 def _observed(plan: ReplicatePlan, number: int, signal: np.ndarray) -> np.ndarray:

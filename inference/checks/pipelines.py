@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from inspect import signature
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..arguments import (
     checked_integer,
     checked_mapping,
 )
-from ..bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
+from ..bolfi import MIN_LEARN, MOST_SIMULATIONS
 from ..loop import fit
 from ..prior import Prior, checked_prior
 from ..progress import progress_bar
@@ -39,11 +39,9 @@ CALLING = "vectorised", "together", "time_limit"  # options of `fit` about its s
 OF_PIPELINE = {"simulate", "prior", "observed", "budget", "seed"}  # what a pipeline gives itself
 
 
-def _check_options(function: Callable[..., object], options: Options, sampling: Options) -> None:
-    """Raise ValueError for options that `function`, `fit` or `Bolfi`, or `Fit.sample` refuses."""
-    options = checked_mapping("options", options, "values")
-    sampling = checked_mapping("sampling", sampling, "values")
-    known = signature(function).parameters
+def _check_options(options: Options, sampling: Options) -> None:
+    """Raise ValueError for options that `fit` or `Fit.sample` refuses."""
+    known = signature(fit).parameters
     of_family = {name: value for name, value in options.items() if name not in known}
     resolve(options.get("surrogate"), of_family)
     _check_names("options", options, set(known) | set(of_family))
@@ -57,16 +55,6 @@ def _check_names(which: str, given: Options, known: set[str]) -> None:
         raise ValueError(f"{which} must be among {sorted(allowed)}, got {wrong}")
 
 
-def _batched(
-    simulate: Simulator | SingleSimulator, options: Options
-) -> tuple[Simulator, dict[str, Any]]:
-    """A simulator of batches, and the options without those that say how it is called."""
-    others = checked_mapping("options", options, "values")
-    check_flag("options['vectorised']", others.get("vectorised", True))
-    called = {name: others.pop(name) for name in CALLING if name in others}
-    return batched(simulate, **called), others
-
-
 @dataclass(frozen=True)
 class FitPipeline:
     """`fit` and `Fit.sample` on each set of data, with new simulations each time.
@@ -74,7 +62,7 @@ class FitPipeline:
     Attributes:
         simulate, prior: See `fit`. With "vectorised": False among the options, `simulate` becomes
             the simulator of batches that calls the given one for each run.
-        budget: Simulations per set of data.
+        budget: Simulations per set of data; it may be 0 with "earlier" among the options.
         options: Other options of `fit`, such as {"surrogate": "signal", "timeout": 60}.
         sampling: Options of `Fit.sample`, such as {"chains": 2, "draws": 250}.
         warn: Whether a replicate's complaints are raised as warnings.
@@ -93,52 +81,19 @@ class FitPipeline:
     def __post_init__(self) -> None:
         check_function("simulate", self.simulate)
         checked_prior(self.prior)
-        checked_integer("budget", self.budget, MIN_LEARN, MOST_SIMULATIONS)
         check_flag("warn", self.warn)
-        _check_options(fit, self.options, self.sampling)
-        simulate, options = _batched(self.simulate, self.options)
-        object.__setattr__(self, "simulate", simulate)
+        options = checked_mapping("options", self.options, "values")
+        least = 0 if "earlier" in options else MIN_LEARN
+        checked_integer("budget", self.budget, least, MOST_SIMULATIONS)
+        _check_options(options, checked_mapping("sampling", self.sampling, "values"))
+        check_flag("options['vectorised']", options.get("vectorised", True))
+        called = {name: options.pop(name) for name in CALLING if name in options}
+        object.__setattr__(self, "simulate", batched(self.simulate, **called))
         object.__setattr__(self, "options", options)
 
     def __call__(self, observed: np.ndarray, seed: int) -> "tuple[xr.DataTree, LogDensity]":
         options = {"progress": False, "warn": self.warn, **self.options}
         made = fit(self.simulate, self.prior, observed, budget=self.budget, seed=seed, **options)
-        sampling = {"warn": self.warn, **self.sampling}
-        return made.sample(seed=seed, **sampling), made.log_prob
-
-
-@dataclass(frozen=True, repr=False, eq=False)
-class SharedDesign:
-    """One set of simulations that serves every set of data; see `shared_design`.
-
-    Attributes:
-        simulate: Makes the data of the replicates; the design is made already.
-        prior: The parameters and their priors.
-        theta: Parameters of the simulations [n, d], natural units.
-        signals: [n, *signal_shape]; rows of NaN where a simulation failed.
-        seeds: [n].
-        options: Options of `Bolfi`, such as {"surrogate": "signal"}.
-        sampling: Options of `Fit.sample`.
-        warn: Whether a replicate's complaints are raised as warnings.
-    """
-
-    simulate: Simulator
-    prior: Prior
-    theta: np.ndarray
-    signals: np.ndarray
-    seeds: np.ndarray
-    options: Options = field(default_factory=dict)
-    sampling: Options = field(default_factory=dict)
-    warn: bool = field(default=True, compare=False)
-
-    def __repr__(self) -> str:
-        n, *shape = self.signals.shape
-        return f"SharedDesign({self.prior}, {n} simulations of shape {tuple(shape)})"
-
-    def __call__(self, observed: np.ndarray, seed: int) -> "tuple[xr.DataTree, LogDensity]":
-        engine = Bolfi(self.prior, observed, seed=seed, **self.options)
-        engine.tell(self.prior.to_dict(self.theta), self.signals, self.seeds)
-        made = engine.fit(warn=self.warn)
         sampling = {"warn": self.warn, **self.sampling}
         return made.sample(seed=seed, **sampling), made.log_prob
 
@@ -158,8 +113,8 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
     timeout: float | None = None,
     warn: bool = True,
     progress: bool | Callable[[int], object] = True,
-) -> SharedDesign:
-    """A pipeline whose n simulations are made here, once, for all replicates.
+) -> FitPipeline:
+    """A pipeline whose n simulations are made here, once, and are "earlier" ones of all replicates.
 
     The points fill the prior (scrambled Sobol) instead of following an acquisition, which
     depends on the data. What is checked is then this one emulator, averaged over data: many
@@ -170,8 +125,7 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
         n: Simulations, at least three.
         batch: Simulations in one call, and stored together, where there is no executor.
         seed: Fixes the points and the simulations' seeds.
-        options: Of `Bolfi`, such as {"surrogate": "signal"}; and "vectorised", "together" and
-            "time_limit", see `fit`.
+        options: Of `fit`, such as {"surrogate": "signal"}.
         sampling: Of `Fit.sample`, such as {"chains": 2, "draws": 250}.
         warn: Whether a replicate's complaints are raised as warnings.
 
@@ -180,21 +134,17 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
         RuntimeError: fewer than three simulations succeeded, or the executor lost its workers.
         ImportError, ConnectionError: Dask is not installed, or does not answer.
     """
-    check_function("simulate", simulate)
     n = checked_integer("n", n, MIN_LEARN, MOST_SIMULATIONS)
+    pipeline = FitPipeline(simulate, prior, n, options or {}, sampling or {}, warn)
     seed = checked_integer("seed", seed, 0)
     check_progress(progress)
-    checked_prior(prior)
     check_text("identity", identity)
-    check_flag("warn", warn)
-    simulator, options = _batched(simulate, options or {})
-    _check_options(Bolfi, options, sampling or {})
     theta = prior.from_unit(sobol(seed, 0, n, len(prior)))
     seeds = [simulation_seed(seed, i) for i in range(n)]
     with ExitStack() as stack:
         compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         advance = stack.enter_context(progress_bar("simulations", n, shown=progress))
-        asked = jobs(theta, seeds)
+        simulator, asked = cast(Simulator, pipeline.simulate), jobs(theta, seeds)
         made = run_missing(simulator, asked, compute, identity=identity, advance=advance)
     good = sum(result.signal is not None for result in made)
     if good < MIN_LEARN:
@@ -202,5 +152,5 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
         raise RuntimeError(
             f"{good} of {n} simulations succeeded, {MIN_LEARN} are needed; the first error: {first}"
         )
-    design = prior.to_array(theta), stacked(made), np.array(seeds)
-    return SharedDesign(simulator, prior, *design, options, sampling or {}, warn)
+    told = {"earlier": (theta, stacked(made), np.array(seeds)), "confirm": 0}
+    return replace(pipeline, budget=0, options={**pipeline.options, **told})

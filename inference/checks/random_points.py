@@ -1,17 +1,13 @@
 """Tests of accuracy with random points: coverage of the posterior as a whole."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._lazy import stats, xr
-from ..prior import Prior
-from ..types import Simulator
 from . import bands
-from .finished_replicates import Replicates, table
-from .many_replicates import check_level, made_or_given
-from .one_replicate import Pipeline
+from .finished_replicates import Judged, Replicates, check_judged, table
 from .ranks import quantiles, to_ranks
 
 if TYPE_CHECKING:
@@ -22,7 +18,7 @@ CONFIDENCE = 0.95  # of the bootstrap band
 
 
 @dataclass(frozen=True, eq=False)
-class Tarp:
+class Tarp(Judged):
     """Expected coverage probability against credibility.
 
     Attributes:
@@ -65,11 +61,6 @@ class Tarp:
                 f"diagonal {self.atc:+.3f}; negative: draws too narrow, positive: too wide)",
             ]
         return said
-
-    @property
-    def ok(self) -> bool:
-        """No warning."""
-        return not self.warnings
 
     def __str__(self) -> str:
         row = [f"{self.ecdf:.3g}", f"{self.kolmogorov_smirnov:.3g}", f"{self.atc:+.3f}"]
@@ -114,14 +105,7 @@ class Tarp:
         return finish(ax, n, loc="upper left")
 
 
-def tarp(
-    of: Replicates | Pipeline,
-    simulate: Simulator | None = None,
-    prior: Prior | None = None,
-    *,
-    alpha: float = 0.01,
-    **run: Any,
-) -> Tarp:
+def tarp(made: Replicates, *, alpha: float = 0.01) -> Tarp:
     """Tests of accuracy with random points (Lemos et al. 2023).
 
     Each replicate gets a random point; the region of credibility c is the ball around it that
@@ -132,29 +116,25 @@ def tarp(
     which distances are measured too, so no parameter's scale counts.
 
     Args:
-        of: Replicates, or a pipeline for which `replicates` makes them.
-        simulate, prior, run: Arguments of `replicates`; only with a pipeline.
+        made: What `replicates` returned.
         alpha: False alarms of `ok`.
 
     Raises:
-        ValueError: as `replicates`; or none finished.
+        ValueError: `made` is something else, or none finished.
     """
-    check_level(alpha)
-    made = made_or_given(of, simulate, prior, run)
-    truth, draws = (_distances(made, rows) for rows in _stacked(made))
+    check_judged(made, alpha)
+    truth, draws = _distances(made, made.truth[:, None]), _distances(made, made.draws)
     u = quantiles(truth[:, 0], draws, made.random("tarp"))
     ranks = to_ranks(u, made.most)
-    curve = _curve(np.bincount(ranks, minlength=made.most + 1))
+    counts = np.bincount(ranks, minlength=made.most + 1)
     rng = np.random.default_rng([made.seed, len(made)])
-    resampled = rng.multinomial(
-        len(made), np.bincount(ranks, minlength=made.most + 1) / len(made), size=BOOTSTRAPS
-    )
+    resampled = rng.multinomial(len(made), counts / len(made), size=BOOTSTRAPS)
     tail = (1 - CONFIDENCE) / 2
     low, high = np.quantile(_curve(resampled), [tail, 1 - tail], axis=0)
     return Tarp(
         replicates=made,
         credibility=np.linspace(0.0, 1.0, made.most + 2),
-        expected_coverage=curve,
+        expected_coverage=_curve(counts),
         low=low,
         high=high,
         ranks=ranks,
@@ -162,13 +142,6 @@ def tarp(
         kolmogorov_smirnov=float(stats.kstest(u, "uniform").pvalue),
         alpha=alpha,
     )
-
-
-def _stacked(made: Replicates) -> tuple[np.ndarray, np.ndarray]:
-    """Truths [R, 1, d] and draws [R, L, d], natural units, as `values` has checked them."""
-    columns = list(made.values().values())
-    truth, draws = (np.stack(part, -1) for part in zip(*columns, strict=True))
-    return truth[:, None], draws
 
 
 def _distances(made: Replicates, rows: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..simulations.database import disk_errors, opened_database
-from ..simulations.failures import Failure, FailureKind
+from ..simulations.failures import failure_columns, failure_of
 from .one_replicate import Replicate
 
 SCHEMA = """
@@ -76,12 +76,8 @@ class ReplicateStore:
         file = io.BytesIO()
         np.savez_compressed(file, **{k: v for k, v in held.items() if v is not None})
         effective = None if np.isnan(replicate.effective) else replicate.effective
-        failure = replicate.error
-        why = (None, None) if failure is None else (failure.kind.value, failure.text)
-        row = (
-            *(replicate.number, file.getvalue(), effective, replicate.seconds),
-            *(replicate.stage, *why),
-        )
+        kept = (replicate.number, file.getvalue(), effective, replicate.seconds)
+        row = (*kept, replicate.stage, *failure_columns(replicate.error))
         with disk_errors(self.path):
             self._connection.execute(
                 "INSERT INTO replicate VALUES (?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET "
@@ -108,8 +104,8 @@ def _from_row(row: tuple) -> Replicate:
         held = dict(file)
     held.setdefault("log_density", None)
     size = np.nan if effective is None else effective
-    error = None if kind is None else Failure(FailureKind(kind), text)
-    return Replicate(number, effective=size, seconds=seconds, stage=stage, error=error, **held)
+    how = {"effective": size, "seconds": seconds, "stage": stage, "error": failure_of(kind, text)}
+    return Replicate(number, **how, **held)
 
 
 def _difference(path: str, stored: Mapping[str, str], settings: Mapping[str, str]) -> str:

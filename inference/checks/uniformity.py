@@ -2,17 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._lazy import stats, xr
-from ..prior import Prior
-from ..types import Simulator
 from . import bands
-from .finished_replicates import LOG_DENSITY, Quantity, Replicates, checked_quantities, table
-from .many_replicates import check_level, made_or_given
-from .one_replicate import Pipeline
+from .finished_replicates import LOG_DENSITY, Judged, Quantity, Replicates, check_judged, table
 from .ranks import bin_count, to_ranks
 
 if TYPE_CHECKING:
@@ -22,7 +18,7 @@ NAMED_SHAPE_Z = 3.0  # standard errors from which a shape of the ranks is named
 
 
 @dataclass(frozen=True, eq=False)
-class SBC:
+class SBC(Judged):
     """Ranks of R truths among their draws, and how well they agree with uniform ones.
 
     Attributes:
@@ -56,11 +52,6 @@ class SBC:
             for name, p, ranks in zip(self.names, least, self.ranks.T, strict=True)
             if p < limit
         ]
-
-    @property
-    def ok(self) -> bool:
-        """No warning."""
-        return not self.warnings
 
     def __str__(self) -> str:
         rows = [
@@ -101,32 +92,6 @@ class SBC:
         ax.set_ylabel("ECDF − uniform")
         return finish(ax, n, **LEGEND_BELOW)
 
-    def histogram(self, axes: Any = None, level: float = 0.95) -> "list[Axes]":
-        """Binned ranks, one axes per quantity; grey holds each bar with probability `level`."""
-        from ..figures import GREY, INK, bare, some_axes
-        from .plots import BAND, colour
-
-        n, q = self.ranks.shape
-        size = (max(2.6 * q, 3.2), 2.6)
-        panels = some_axes(axes, q, "quantities", ncols=q, figsize=size, sharey=True)
-        bins = bin_count(n, self.draws)
-        low, high = stats.binom.interval(level, n, 1 / bins)
-        for j, (name, ax) in enumerate(zip(self.names, panels, strict=True)):
-            counts = np.bincount(self.ranks[:, j] * bins // (self.draws + 1), minlength=bins)
-            ax.axhspan(low, high, color=BAND, lw=0)
-            ax.axhline(n / bins, color=GREY, lw=0.8)
-            ax.stairs(
-                counts, np.linspace(0.0, 1.0, bins + 1), color=colour(j), fill=True, alpha=0.35
-            )
-            ax.stairs(counts, np.linspace(0.0, 1.0, bins + 1), color=colour(j), lw=1.2)
-            ax.set_xlim(0.0, 1.0)
-            ax.set_ylim(0.0, 1.15 * max(counts.max(), high))
-            ax.set_title(name, color=INK)
-            ax.set_xlabel("rank, as a fraction")
-            bare(ax)
-        panels[0].set_ylabel(f"replicates of {n}")
-        return panels
-
 
 def _shape(name: str, ranks: np.ndarray, draws: int) -> str:
     """Meaning of a departure from uniform ranks of a plain shape; "" for any other."""
@@ -144,13 +109,10 @@ def _shape(name: str, ranks: np.ndarray, draws: int) -> str:
 
 
 def sbc(
-    of: Replicates | Pipeline,
-    simulate: Simulator | None = None,
-    prior: Prior | None = None,
+    made: Replicates,
     *,
     quantities: Mapping[str, Quantity] | None = None,
     alpha: float = 0.01,
-    **run: Any,
 ) -> SBC:
     """Simulation-based calibration (Talts et al. 2018; Modrák et al. 2023).
 
@@ -161,17 +123,14 @@ def sbc(
     pipeline return one, or give it as a quantity.
 
     Args:
-        of: Replicates, or a pipeline for which `replicates` makes them.
-        simulate, prior, run: Arguments of `replicates`; only with a pipeline.
+        made: What `replicates` returned.
         quantities: Further functions (theta: name -> [n], observed) -> [n] to rank.
         alpha: False alarms of `ok`.
 
     Raises:
-        ValueError: as `replicates`; or none finished.
+        ValueError: `made` is something else, none finished, or a quantity is refused.
     """
-    check_level(alpha)
-    checked_quantities(quantities)
-    made = made_or_given(of, simulate, prior, run)
+    check_judged(made, alpha)
     values = made.values(quantities) | made.log_density()
     ranks = to_ranks(made.quantiles(values), made.most)
     bins = bin_count(len(made), made.most)

@@ -17,9 +17,10 @@ from .misfit import Found as Found
 from .misfit import Window as Window
 from .model_extension import Extension as Extension
 from .next_experiment import Suggestion as Suggestion
+from .of_fit import criticise_fit as criticise_fit
 from .posterior import weighted_posterior as weighted_posterior
-from .search import Plan as Plan
-from .simulate import Report as Report
+from .study import Plan as Plan
+from .study import Report as Report
 from .usual_residual import CleanData as CleanData
 from .usual_residual import UsualResidual as UsualResidual
 from .usual_residual import model_error as model_error

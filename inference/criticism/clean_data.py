@@ -9,9 +9,8 @@ from ..simulations.compute import Compute
 from .experiment import Experiment
 from .model_extension import Extensions
 from .prior_boxes import everywhere
-from .run_table import joined
-from .search import Plan, Study
-from .simulate import Report, SimulatorRuns, silent
+from .runs import joined
+from .study import Plan, Report, Study, silent
 
 CLEAN_PASSES = 2  # of runs where the model fits best: so far, and with what the first taught
 CLEAN_RUNS = 2  # of each; the mean of the last is free of the emulator's error
@@ -48,23 +47,14 @@ def own_residual(
     Raises:
         RuntimeError: every simulation failed, or the executor lost its workers.
     """
-    simulator = SimulatorRuns(
-        simulate=experiment.simulate,
-        prior=prior,
-        extensions=extensions,
-        compute=compute,
-        identity=experiment.identity,
-        report=report,
-        shape=experiment.shape,
-    )
-    study = Study(simulator, experiment.observed, experiment.noise, Plan(start=start))
+    study = Study(experiment, prior, extensions, compute, Plan(start=start), report=report)
     whole = everywhere(len(prior))
-    made = simulator.run("start", study.points(whole, (), start))
+    made = study.run("start", study.points(whole, (), start))
     runs = [made]
     fits = [study.hypothesis((), made, whole)]
     for attempt in range(CLEAN_PASSES):
         at_best = {name: np.full(CLEAN_RUNS, value) for name, value in fits[-1].best.items()}
-        made = simulator.run(f"best {attempt}", at_best)
+        made = study.run(f"best {attempt}", at_best)
         runs.append(made)
         fits.append(study.hypothesis((), joined(runs), whole))
     before, fitted = fits[-2:]

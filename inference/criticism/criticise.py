@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -16,16 +16,16 @@ from ..simulations.compute import open_compute
 from ..simulations.executors import Workers
 from ..simulations.job import BATCH
 from .experiment import Experiment, Proposal
-from .held_out import Gap, gap, holds, predict
+from .held_out import Gap, gap, holds
 from .hypothesis import Hypothesis
 from .measurement_noise import Noise, samples
 from .misfit import Found, locate, null_draws
 from .model_extension import Extensions, check_extensions
 from .next_experiment import Suggestion, suggest
 from .posterior import Interval, Weighted, weighted_posterior
-from .search import Base, Plan, Study, examine, explain
+from .search import Base, examine, explain
 from .signatures import confusion
-from .simulate import AllRunsFailed, Report, SimulatorRuns, silent
+from .study import AllRunsFailed, Plan, Report, Study, silent
 from .usual_residual import model_error_rms, without_model_error
 from .verdict import REJECTION_LEVEL, Candidate, Verdict, VerdictKind, conclude, tied
 
@@ -43,7 +43,6 @@ class Criticism(Displayed):
         extended: The model with the accepted effects; None without.
         posterior: Of the extended model, or else of the base model.
         before, after: Where the data disagree with the base and with the extended model.
-        gaps: On held-out data, for each explanation that came so far: names -> gaps.
         suggestions: Experiments that would separate explanations, best first.
         untested: Effects whose simulations failed, or that were not refitted, or could not be
             simulated for the held-out data, though they might explain the difference.
@@ -61,7 +60,6 @@ class Criticism(Displayed):
     posterior: Weighted
     before: tuple[Found, ...]
     after: tuple[Found, ...]
-    gaps: Mapping[tuple[str, ...], tuple[Gap, ...]]
     suggestions: tuple[Suggestion, ...]
     untested: tuple[str, ...]
     observed: np.ndarray
@@ -99,6 +97,11 @@ class Criticism(Displayed):
     def singles(self) -> dict[str, Candidate]:
         """The explanations by one effect."""
         return {one.names[0]: one for one in self.candidates if len(one.names) == 1}
+
+    @property
+    def gaps(self) -> dict[tuple[str, ...], tuple[Gap, ...]]:
+        """On held-out data, for each explanation that came so far: names -> gaps."""
+        return {one.names: one.gaps for one in self.candidates if one.gaps}
 
     @property
     def refuted(self) -> tuple[tuple[str, ...], ...]:
@@ -208,96 +211,78 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         report(phase, finished)
 
     with open_compute(executor, timeout, batch, bank) as compute:
-        simulator = SimulatorRuns(
-            experiment.simulate,
-            prior,
-            extensions,
-            compute,
-            seed,
-            counted,
-            experiment.shape,
-            experiment.identity,
-        )
-        study = Study(simulator, experiment.corrected, experiment.noise, plan or Plan())
-        base, untested = examine(study, None if earlier is None else simulator.table(*earlier))
-        tried = Tried([], [], {}, ())
+        study = Study(experiment, prior, extensions, compute, plan or Plan(), seed, counted)
+        base, untested = examine(study, None if earlier is None else study.table(*earlier))
+        candidates, members = [], []
         if accept is not None or base.check.p_value < level:
-            tried = _try(study, base, accept, held_out)
-        verdict = conclude(base.check, tried.members, level)
-        suggestions = suggest(simulator, proposals, _rivals(verdict, tried))
+            candidates, members = _try(study, base, accept, held_out)
+        verdict = conclude(base.check, members, level)
+        suggestions = suggest(study, proposals, _rivals(verdict, candidates, members))
     accepted = tuple(accept) if accept is not None else _named(verdict)
-    leading = _among(tried.candidates, accepted)
+    leading = _among(candidates, accepted)
     extended = leading.hypothesis if leading else None
     left = []
     if extended is not None:
-        null = null_draws(extended, study.noise, np.random.default_rng(seed))
+        null = null_draws(extended, experiment.noise, np.random.default_rng(seed))
         left = locate(extended, experiment.windows, null)
     return Criticism(
         verdict=verdict,
         accepted=accepted,
         base=base,
-        candidates=tuple(tried.candidates),
+        candidates=tuple(candidates),
         extended=extended,
         posterior=weighted_posterior(extended or base.hypothesis, seed),
         before=tuple(locate(base.hypothesis, experiment.windows, base.null)),
         after=tuple(left),
-        gaps=tried.gaps,
         suggestions=tuple(suggestions),
-        untested=tuple(
-            dict.fromkeys((*untested, *_left_out(tried.candidates), *tried.unpredicted))
-        ),
+        untested=tuple(dict.fromkeys((*untested, *_left_out(candidates)))),
         observed=experiment.observed,
         noise=experiment.noise,
         units={name: one.unit for name, one in extensions.items()},
-        tied=tuple(one.names for one in tied(tried.members)),
+        tied=tuple(one.names for one in tied(members)),
         simulations=count,
     )
 
 
-class Tried(NamedTuple):
-    """Explanations that were tried.
-
-    Attributes:
-        candidates: All of them.
-        members: Those that passed, their gains with those on the held-out data.
-        gaps: On held-out data, names -> gaps.
-        unpredicted: Effects of explanations that could not be simulated for the held-out data.
-    """
-
-    candidates: list[Candidate]
-    members: list[Candidate]
-    gaps: dict[tuple[str, ...], tuple[Gap, ...]]
-    unpredicted: tuple[str, ...]
-
-
 def _try(
     study: Study, base: Base, accept: Sequence[str] | None, held_out: Sequence[Experiment]
-) -> Tried:
-    """Fit explanations, and test those that passed on the held-out data."""
+) -> tuple[list[Candidate], list[Candidate]]:
+    """Fit explanations, and test those that passed on the held-out data.
+
+    Returns:
+        All of them; and those that passed, but for what cannot be simulated for held-out data.
+    """
     candidates, members = explain(study, base, accept)
-    chosen = {c.names: c for c in [*members, _among(candidates, accept)] if c}
-    gaps = _gaps(study, base, list(chosen.values()), held_out)
+    passed = [one.names for one in members]
+    accepted = _among(candidates, accept)
+    chosen = [one for one in candidates if one.names in passed or one is accepted]
+    gaps = _gaps(study, base, chosen, held_out)
     # what cannot be simulated there is not borne out there
-    failed = [names for names in chosen if held_out and names not in gaps]
+    failed = [one.names for one in chosen if held_out and one.names not in gaps]
     judged = [
-        replace(c, held=c.names not in failed and holds(gaps.get(c.names, ()))) for c in candidates
+        replace(one, gaps=gaps.get(one.names, ()), predicted=one.names not in failed)
+        for one in candidates
     ]
-    borne = [_judged(member, gaps) for member in members if member.names not in failed]
-    return Tried(judged, borne, gaps, tuple(dict.fromkeys(sum(failed, ()))))
+    return judged, [one for one in judged if one.names in passed and one.predicted]
 
 
-def _rivals(verdict: Verdict, tried: Tried) -> list[Candidate]:
+def _rivals(
+    verdict: Verdict, candidates: Sequence[Candidate], members: Sequence[Candidate]
+) -> list[Candidate]:
     """Explanations that a further experiment should tell apart."""
     if verdict.kind is VerdictKind.TIE:
-        return tied(tried.members)
+        return tied(members)
     if verdict.kind is VerdictKind.UNKNOWN:
-        return sorted(tried.candidates, key=lambda c: -c.gain)[:2]
+        return sorted(candidates, key=lambda c: -c.gain)[:2]
     return []
 
 
 def _left_out(candidates: Sequence[Candidate]) -> list[str]:
-    """Effects that alone would pass the test, but that were not refitted."""
-    return [c.names[0] for c in candidates if len(c.names) == 1 and c.passes and not c.refitted]
+    """Effects that alone would pass the test but were not refitted, and those of explanations that
+    could not be simulated for held-out data."""
+    alone = [c for c in candidates if len(c.names) == 1 and c.passes and not c.refitted]
+    unpredicted = [c for c in candidates if not c.predicted]
+    return [name for c in (*alone, *unpredicted) for name in c.names]
 
 
 def _named(verdict: Verdict) -> tuple[str, ...]:
@@ -314,28 +299,25 @@ def _gaps(
 ) -> dict[tuple[str, ...], tuple[Gap, ...]]:
     """Names -> gaps, of those that can be simulated for the held-out data."""
     count, seed = study.plan.held_out, study.seed
-    if not chosen:
+    if not chosen or not held_out:
         return {}
     models = [base.hypothesis, *(candidate.hypothesis for candidate in chosen)]
     drawn = [weighted_posterior(model, seed).draw(seed, count) for model in models]
     gaps: dict[tuple[str, ...], tuple[Gap, ...]] = {model.names: () for model in models[1:]}
     for one in held_out:
-        before, *after = predict(study.simulator, one, drawn)
-        if isinstance(before, AllRunsFailed):
-            raise before
+        before, *after = study.run_each(f"held out {one.label}", drawn, one)
+        if not len(before):
+            raise AllRunsFailed(before.error)
+        there = np.isfinite(one.observed)
         gaps = {
-            model.names: (*gaps[model.names], gap(one, before, made, seed))
+            model.names: (
+                *gaps[model.names],
+                gap(one, before.signals[:, there], made.signals[:, there], seed),
+            )
             for model, made in zip(models[1:], after, strict=True)
-            if not isinstance(made, AllRunsFailed) and model.names in gaps
+            if len(made) and model.names in gaps
         }
-    return gaps if held_out else {}
-
-
-def _judged(candidate: Candidate, gaps: Mapping[tuple[str, ...], tuple[Gap, ...]]) -> Candidate:
-    """The candidate in view of the held-out data: their evidence counts, and their veto."""
-    found = gaps.get(candidate.names, ())
-    gain = candidate.gain + sum(one.lpd_gain for one in found)
-    return replace(candidate, gain=gain, held=holds(found))
+    return gaps
 
 
 def _check_experiments(

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arguments import check_function, check_kind, check_text, checked_array, checked_integer
 from ..types import Simulator
-from .measurement_noise import Noise
+from .measurement_noise import Noise, check_noise
 from .misfit import Window
 from .usual_residual import expected_model_error
 
@@ -41,7 +41,7 @@ class Experiment:
         if not np.isfinite(observed).any():
             raise ValueError(f"{self.label}: observed must have a finite value, got none")
         check_text("identity", self.identity)
-        _check_noise(self.label, self.noise)
+        check_noise(f"{self.label}: noise", self.noise)
         check_kind("windows", self.windows, list | tuple)
         for window in self.windows:
             check_kind("each of windows", window, Window)
@@ -84,14 +84,7 @@ class Proposal:
 
     def __post_init__(self) -> None:
         check_function("simulate", self.simulate)
-        _check_noise(self.label, self.noise)
+        check_noise(f"{self.label}: noise", self.noise)
         check_kind("shape", self.shape, tuple)
         for length in self.shape:
             checked_integer("each of shape", length)
-
-
-def _check_noise(label: str, noise: object) -> None:
-    if not (hasattr(noise, "covariance") and hasattr(noise, "draw")):
-        raise ValueError(
-            f"{label}: noise must be a Noise, such as KnownNoise(0.01), got {noise!r:.100}"
-        )

@@ -1,6 +1,6 @@
 """Whether an explanation holds on data that it was not fitted to."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,12 +9,9 @@ from .._float64 import in_float64
 from ..surrogates.output_vectors import MIN_LONG
 from .experiment import Experiment
 from .measurement_noise import gaussian, samples
-from .misfit import MODES_PER_CHANNEL, exceedance, orthonormal, slow_modes
+from .misfit import ACCEPTANCE_LEVEL, MODES_PER_CHANNEL, exceedance, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
-from .run_table import Runs
-from .simulate import AllRunsFailed, SimulatorRuns
 from .usual_residual import model_error_rms, without_model_error
-from .verdict import ACCEPTANCE_LEVEL
 
 NOISE_QUANTILE = 0.99  # quantile of the noise's RMS below which a gap may be noise
 MAX_LEFT_SHARE = 0.5  # of a gap beyond noise that an explanation may leave, unless it may be noise
@@ -77,16 +74,6 @@ def holds(gaps: Sequence[Gap]) -> bool:
     explained = after <= MAX_LEFT_SHARE * before or all(one.after <= one.floor for one in gaps)
     gained = sum(one.lpd_gain for one in gaps) > MIN_LPD_GAIN
     return bool(all(one.fits for one in gaps) and explained and gained)
-
-
-def predict(
-    simulator: SimulatorRuns, experiment: Experiment, thetas: Sequence[Mapping[str, np.ndarray]]
-) -> list[np.ndarray | AllRunsFailed]:
-    """Simulated outputs of another experiment at each model's posterior draws, finite samples only
-    [k, n]; why there are none where all runs failed."""
-    made = simulator.of(experiment).run_each(f"held out {experiment.label}", thetas)
-    there = np.isfinite(experiment.observed)
-    return [of.signals[:, there] if isinstance(of, Runs) else of for of in made]
 
 
 @in_float64

@@ -20,7 +20,7 @@ from ..surrogates.signal_likelihood import SignalLikelihood, eliminate, scores
 from .measurement_noise import Noise, samples
 from .prior_boxes import LATER_HALF_WIDTH, PriorBox, around, intersection
 from .run_noise import own_errors, resized, smooth_covariance
-from .run_table import Runs
+from .runs import Runs
 from .usual_residual import model_error_part
 
 COMPONENTS = 10

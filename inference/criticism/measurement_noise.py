@@ -26,6 +26,12 @@ class Noise(Protocol):
         ...
 
 
+def check_noise(name: str, noise: object) -> None:
+    """Raise ValueError unless it is a `Noise`."""
+    if not (hasattr(noise, "covariance") and hasattr(noise, "draw")):
+        raise ValueError(f"{name} must be a Noise, such as KnownNoise(0.01), got {noise!r:.100}")
+
+
 @dataclass(frozen=True, eq=False)
 class KnownNoise:
     """Independent noise of known size.

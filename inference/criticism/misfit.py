@@ -11,6 +11,7 @@ from .hypothesis import Hypothesis, values_of
 from .measurement_noise import Noise, gaussian, samples
 from .signatures import Signature, directions
 
+ACCEPTANCE_LEVEL = 0.01  # p-value above which an extended model is not rejected
 REPLICATES = 999  # of the parametric bootstrap
 MODES_PER_CHANNEL = 36  # of each channel: slower than these is what simulators get wrong
 WINDOW_MODES = 3

@@ -1,7 +1,6 @@
 """Which further experiment would tell explanations apart."""
 
 from collections.abc import Sequence
-from contextlib import suppress
 from itertools import combinations
 from typing import NamedTuple
 
@@ -13,7 +12,7 @@ from .experiment import Proposal
 from .measurement_noise import samples
 from .misfit import MODES_PER_CHANNEL, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
-from .simulate import AllRunsFailed, SimulatorRuns
+from .study import Study
 from .verdict import Candidate
 
 RUNS_EACH = 3  # of each explanation in each proposed experiment
@@ -34,7 +33,7 @@ class Suggestion(NamedTuple):
 
 
 def suggest(
-    simulator: SimulatorRuns, proposals: Sequence[Proposal], rivals: Sequence[Candidate]
+    study: Study, proposals: Sequence[Proposal], rivals: Sequence[Candidate]
 ) -> list[Suggestion]:
     """Proposals by how well they separate the worst separated rivals, best first.
 
@@ -42,23 +41,19 @@ def suggest(
     """
     if len(rivals) < 2:
         return []
-    made = []
-    for proposal in proposals:
-        with suppress(AllRunsFailed):
-            made.append(_separation(simulator, proposal, rivals))
-    return sorted(made, key=lambda suggestion: -suggestion.snr)
+    made = (_separation(study, proposal, rivals) for proposal in proposals)
+    return sorted(filter(None, made), key=lambda suggestion: -suggestion.snr)
 
 
-def _separation(
-    simulator: SimulatorRuns, proposal: Proposal, rivals: Sequence[Candidate]
-) -> Suggestion:
-    elsewhere = simulator.of(proposal)
+def _separation(study: Study, proposal: Proposal, rivals: Sequence[Candidate]) -> Suggestion | None:
     names = [" with ".join(rival.names) for rival in rivals]
     signals = []
     for name, rival in zip(names, rivals, strict=True):
         theta = {key: np.full(RUNS_EACH, value) for key, value in rival.hypothesis.best.items()}
-        made = elsewhere.run(f"next {proposal.label} {name}", theta).signals
-        signals.append(made.reshape(len(made), -1))
+        (runs,) = study.run_each(f"next {proposal.label} {name}", [theta], proposal)
+        if not len(runs):
+            return None
+        signals.append(runs.signals.reshape(len(runs), -1))
     snr = {
         (names[a], names[b]): _distance(proposal, signals, a, b)
         for a, b in combinations(range(len(rivals)), 2)

@@ -1,31 +1,26 @@
 """The search for the effect that a model lacks."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from ..arguments import checked_integer
-from .clean_scores import scored_on_clean
-from .hypothesis import Hypothesis, hypothesise
-from .measurement_noise import Noise
-from .misfit import Check, check, null_draws
-from .model_extension import extended
+from .hypothesis import Hypothesis
+from .misfit import Check
 from .prior_boxes import (
     FIRST_HALF_WIDTH,
     LATER_HALF_WIDTH,
     PriorBox,
     around,
     everywhere,
-    fill,
     hull,
     sides,
     with_whole_priors,
 )
-from .run_table import Runs, joined
-from .signatures import Signature, signature
-from .simulate import AllRunsFailed, SimulatorRuns
+from .runs import Runs, joined
+from .signatures import Signature, scored_on_clean, signature
+from .study import MIN_EFFECT_RUNS, AllRunsFailed, Study
 from .verdict import FAR_BEHIND, TIE_MARGIN, Candidate, near_best
 
 BASE_PASSES = 6  # of runs of the base model, those after the first only until the fit is settled
@@ -33,78 +28,8 @@ REFIT_PASSES = 4  # and of an explanation
 FULL_PASS = 8  # runs of a pass of refits, at least: fewer passes, and fuller calls
 MAX_DOUBT = 1.0  # of a settled fit: emulator's variance over all variance, summed over the data
 SIDE_SHARES = (0.7, 0.35)  # of the prior quantiles from neutral to an end: where effects are tried
-MIN_EFFECT_RUNS = 2
 LOOK = "look"  # phase of the first runs of effects where they seem to fit best
 SECOND_EFFECT_GAIN = 6.0  # log likelihood that a second effect must gain
-
-
-@dataclass(frozen=True)
-class Plan:
-    """How many runs each step may make.
-
-    Attributes:
-        base: Of the base model, near where it fits best, in each of up to six passes, beside
-            those there are already.
-        start: Of the base model all over the prior, where there are none yet.
-        extension: Of each effect, and of the base model with the same parameters and seeds.
-        look: Of each of twice as many effects as are refitted, where they seem to fit best.
-        refit: Near the best parameters of a near-best explanation, in each of up to four passes; up
-            to eight where few are refitted.
-        refits: Explanations that are refitted, and pairs of effects after them.
-        held_out: Of each model for each held-out data set.
-        most: Of looks and refits of single effects together, and as many of pairs of them; those
-            beyond are left out.
-    """
-
-    base: int = 8
-    start: int = 16
-    extension: int = 2
-    look: int = 4
-    refit: int = 8
-    refits: int = 4
-    held_out: int = 4
-    most: int = 160
-
-    def __post_init__(self) -> None:
-        for name, count in vars(self).items():
-            least = {"look": 0, "refits": 0, "most": 0, "extension": MIN_EFFECT_RUNS}
-            checked_integer(name, count, least.get(name, 1))
-
-
-class Study(NamedTuple):
-    """Data, and the simulator that should explain them."""
-
-    simulator: SimulatorRuns
-    observed: np.ndarray
-    noise: Noise
-    plan: Plan
-
-    @property
-    def seed(self) -> int:
-        return self.simulator.seed
-
-    def hypothesis(self, names: tuple[str, ...], runs: Runs, within: PriorBox) -> Hypothesis:
-        """The model in which the named effects act, fitted where it was simulated."""
-        prior = extended(self.simulator.prior, self.simulator.extensions, names)
-        return hypothesise(names, prior, runs, self.observed, self.noise, within)
-
-    def points(self, box: PriorBox, names: tuple[str, ...], count: int) -> dict[str, np.ndarray]:
-        """Parameters all over a box, name -> [count]."""
-        prior = extended(self.simulator.prior, self.simulator.extensions, names)
-        return fill(box, prior, self.seed, count)
-
-    def check(
-        self, hypothesis: Hypothesis, signatures: Mapping[str, Signature]
-    ) -> tuple[Check, np.ndarray]:
-        """Its test, and residuals [m, n] of a right model."""
-        null = null_draws(hypothesis, self.noise, np.random.default_rng(self.seed))
-        return check(hypothesis, signatures, null), null
-
-    def candidate(self, base: "Base", hypothesis: Hypothesis, refitted: bool = False) -> Candidate:
-        """The extended model, tested."""
-        metric = base.hypothesis
-        gain = 0.5 * (metric.misfit(metric) - hypothesis.misfit(metric))
-        return Candidate(hypothesis, self.check(hypothesis, base.signatures)[0], gain, refitted)
 
 
 class Base(NamedTuple):
@@ -121,13 +46,13 @@ class Base(NamedTuple):
 
 def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, PriorBox]:
     """Fit the base model near its optimum. Return the fit, its runs and the box of the first."""
-    whole, simulator = everywhere(len(study.simulator.prior)), study.simulator
+    whole = everywhere(len(study.prior))
     start = study.points(whole, (), study.plan.start)
-    runs = simulator.run("start", start) if earlier is None else earlier
+    runs = study.run("start", start) if earlier is None else earlier
     fitted = study.hypothesis((), runs, whole)
     box = first = around(fitted.u, fitted.sd, FIRST_HALF_WIDTH)
     for attempt in range(BASE_PASSES):
-        made = simulator.run(f"base {attempt}", study.points(box, (), study.plan.base))
+        made = study.run(f"base {attempt}", study.points(box, (), study.plan.base))
         runs = joined([runs, made])
         before, fitted = fitted, study.hypothesis((), runs, whole)
         if settled(0.5 * (before.misfit(fitted) - fitted.misfit(fitted)), fitted, box):
@@ -151,7 +76,6 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
     Returns:
         What was found, and the effects of which too few simulations succeeded to learn from.
     """
-    simulator = study.simulator
     base, runs, box = fit_base(study, earlier)
     neutral, known = _screen(study, base.best)
     runs = joined([runs, *neutral])
@@ -161,34 +85,32 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
         name: study.hypothesis((name,), joined([runs, *of]), within) for name, of in known.items()
     }
     signatures = {
-        name: signature(base, single, simulator.extensions[name])
-        for name, single in singles.items()
+        name: signature(base, single, study.extensions[name]) for name, single in singles.items()
     }
-    signatures = scored_on_clean(base, study.noise, signatures)
+    signatures = scored_on_clean(base, study.experiment.noise, signatures)
     tested, null = study.check(base, signatures)
     every = joined([runs, *sum(known.values(), [])])
     found = Base(base, tested, null, signatures, singles, box, every)
-    return found, tuple(name for name in simulator.extensions if name not in known)
+    return found, tuple(name for name in study.extensions if name not in known)
 
 
 def _screen(study: Study, best: Mapping[str, float]) -> tuple[list[Runs], dict[str, list[Runs]]]:
     """Runs of the base model at its best parameters, and beside them of each effect of which at
     least two succeed; where some fail, others are made nearer to neutral."""
-    simulator, count = study.simulator, study.plan.extension
+    count = study.plan.extension
     at_best = {name: np.full(count, value) for name, value in best.items()}
-    found: dict[str, list[Runs]] = {name: [] for name in ("", *simulator.extensions)}
+    found: dict[str, list[Runs]] = {name: [] for name in ("", *study.extensions)}
     for attempt, share in enumerate(SIDE_SHARES):
         lacking = [name for name, of in found.items() if sum(map(len, of)) < count]
         if attempt and not any(lacking):
             break
         asked = [
-            at_best | ({name: sides(simulator.extensions[name], count, share)} if name else {})
+            at_best | ({name: sides(study.extensions[name], count, share)} if name else {})
             for name in lacking
         ]
-        for name, made in zip(
-            lacking, simulator.run_each(f"effects {attempt}", asked), strict=True
-        ):
-            found[name] += [made] if isinstance(made, Runs) else []
+        made = study.run_each(f"effects {attempt}", asked)
+        for name, runs in zip(lacking, made, strict=True):
+            found[name].append(runs)
     neutral = found.pop("")
     return neutral, {name: of for name, of in found.items() if sum(map(len, of)) >= MIN_EFFECT_RUNS}
 
@@ -236,12 +158,18 @@ class Search:
         self.runs = base.runs
         self.counted = len(base.runs)  # those before are none of `Plan.most`
         self.limited = True
-        first = (study.candidate(base, single) for single in base.singles.values())
-        self.found = {one.names: one for one in first}
+        self.found = {of.names: self.candidate(of) for of in base.singles.values()}
 
     @property
     def singles(self) -> list[Candidate]:
         return [one for one in self.found.values() if len(one.names) == 1]
+
+    def candidate(self, hypothesis: Hypothesis, refitted: bool = False) -> Candidate:
+        """The extended model, tested."""
+        metric = self.base.hypothesis
+        gain = 0.5 * (metric.misfit(metric) - hypothesis.misfit(metric))
+        tested, _ = self.study.check(hypothesis, self.base.signatures)
+        return Candidate(hypothesis, tested, gain, refitted)
 
     def visit(
         self, phase: str, candidates: Sequence[Candidate], count: int
@@ -264,14 +192,14 @@ class Search:
         if self.limited:
             boxes = dict(list(boxes.items())[: max(left // count, 0)])
         asked = [study.points(box, names, count) for names, box in boxes.items()]
-        made = dict(zip(boxes, study.simulator.run_each(phase, asked), strict=True))
-        boxes = {names: box for names, box in boxes.items() if isinstance(made[names], Runs)}
-        self.runs = joined([self.runs, *(of for of in made.values() if isinstance(of, Runs))])
+        made = dict(zip(boxes, study.run_each(phase, asked), strict=True))
+        boxes = {names: box for names, box in boxes.items() if len(made[names])}
+        self.runs = joined([self.runs, *made.values()])
         for one in candidates:
             if one.names in boxes:
                 within = hull(one.hypothesis.within, boxes[one.names])
                 fitted = study.hypothesis(one.names, self.runs, within)
-                self.found[one.names] = study.candidate(self.base, fitted, one.refitted)
+                self.found[one.names] = self.candidate(fitted, one.refitted)
         return boxes
 
     def refit(self, candidates: Sequence[Candidate]) -> None:
@@ -305,12 +233,12 @@ class Search:
 
     def together(self, names: tuple[str, ...]) -> Candidate:
         """Effects that were simulated one by one, as if together: wherever any of them was."""
-        study, base, box = self.study, self.base, self.base.box
+        box = self.base.box
         for name in names:
             within = self.found[(name,)].hypothesis.within
             box = hull(box, PriorBox(*(end[: len(box.low)] for end in within)))
-        hypothesis = study.hypothesis(names, self.runs, with_whole_priors(box, len(names)))
-        return study.candidate(base, hypothesis)
+        within = with_whole_priors(box, len(names))
+        return self.candidate(self.study.hypothesis(names, self.runs, within))
 
     def try_pairs(self) -> None:
         """Fit the best effect with those that its residual seems to need most; a pair counts if

@@ -13,7 +13,14 @@ from .._float64 import in_float64
 from .._lazy import stats
 from ..arguments import checked_array, checked_number
 from ..surrogates.measurement_noise import Layout
-from .measurement_noise import Noise, SumOfNoises, gaussian, samples, stationary
+from .measurement_noise import (
+    Noise,
+    SumOfNoises,
+    check_noise,
+    gaussian,
+    samples,
+    stationary,
+)
 
 REPEATED = 0.85
 """Correlation of a simulator's errors in two repetitions of one experiment. Of the stirs of the
@@ -37,18 +44,19 @@ class CleanData(NamedTuple):
         residual: Less the calibrated simulator's mean [T, channels]; NaN where missing.
         noise: Of its measurement.
         same: Whether it repeats the experiment that is looked at, sample by sample.
-        away: Of its regime from that of the data that are looked at, see `usual_residual`.
+        regime_distance: Of its regime from that of the data that are looked at, see
+            `usual_residual`.
     """
 
     residual: np.ndarray
     noise: Noise
     same: bool
-    away: float
+    regime_distance: float
 
     @property
     def correlation(self) -> float:
         """Of the simulator's error on it with that on the data that are looked at."""
-        return REPEATED * float(_likeness(self.away)) * self.same
+        return REPEATED * float(_likeness(self.regime_distance)) * self.same
 
     def values(self, at: Layout) -> np.ndarray:
         """The residual at n samples [n]; a missing one is zero."""
@@ -111,10 +119,10 @@ class UsualResidual:
         """
         for k, (one, weight) in enumerate(zip(self.clean, _weights(self.clean), strict=True)):
             others = [
-                other._replace(away=other.away - one.away)
+                other._replace(regime_distance=other.regime_distance - one.regime_distance)
                 for other in self.clean[:k] + self.clean[k + 1 :]
             ]
-            if one.same and sum(_likeness(other.away) for other in others) >= MIN_OTHERS:
+            if one.same and sum(_likeness(other.regime_distance) for other in others) >= MIN_OTHERS:
                 yield one, float(weight), _learned(others)
 
     def _given(self, at: Layout) -> tuple[np.ndarray, np.ndarray]:
@@ -166,21 +174,22 @@ def _frozen(array: np.ndarray) -> np.ndarray:
     return array
 
 
-def _likeness(away: np.ndarray | float) -> np.ndarray:
+def _likeness(regime_distance: np.ndarray | float) -> np.ndarray:
     """Correlation of a simulator's errors in two regimes, from 0 to 1."""
-    return np.exp(-0.5 * np.square(away))
+    return np.exp(-0.5 * np.square(regime_distance))
 
 
 def _correlation(one: CleanData, other: CleanData) -> float:
     """Of the simulator's errors on two repetitions."""
-    return 1.0 if one is other else REPEATED * float(_likeness(one.away - other.away))
+    apart = one.regime_distance - other.regime_distance
+    return 1.0 if one is other else REPEATED * float(_likeness(apart))
 
 
 def usual_residual(
     residuals: Sequence[np.ndarray],
     noises: Sequence[Noise],
     same: Sequence[bool],
-    away: Sequence[float] | np.ndarray | None = None,
+    regime_distance: Sequence[float] | np.ndarray | None = None,
 ) -> UsualResidual:
     """Learn a simulator's residual from clean data.
 
@@ -189,9 +198,9 @@ def usual_residual(
             samples equally far apart; NaN where missing.
         noises: Of each one's measurement, which is not the simulator's fault.
         same: Which of them repeat the experiment that will be looked at, sample by sample.
-        away: How far the regime of each is from that which will be looked at, along an axis on
-            which a simulator's errors change over a distance of 1; None where all are of one
-            regime. A simulator may err by much in one regime and by nothing in another: what is
+        regime_distance: How far the regime of each is from that which will be looked at, along an
+            axis on which a simulator's errors change over a distance of 1; None where all are of
+            one regime. A simulator may err by much in one regime and by nothing in another: what is
             learned of sizes is learned from the nearest.
 
     Raises:
@@ -202,17 +211,18 @@ def usual_residual(
     count = len(residuals)
     if not count:
         raise ValueError("a usual residual needs at least one clean data set")
-    apart = np.zeros(count) if away is None else checked_array("away", away)
-    parts: dict[str, Any] = {"noises": noises, "same": same, "away": apart}
+    away = np.zeros(count) if regime_distance is None else regime_distance
+    away = checked_array("regime_distance", away)
+    parts: dict[str, Any] = {"noises": noises, "same": same, "regime_distance": away}
     for name, given in parts.items():
         if np.ndim(given) != 1 or len(given) != count:
             raise ValueError(f"{name} must have {count} entries, got {given!r:.100}")
-    if not np.isfinite(apart).all():
-        raise ValueError(f"away must be {count} finite numbers, got {away}")
+    if not np.isfinite(away).all():
+        raise ValueError(f"regime_distance must be {count} finite numbers, got {away}")
     clean = [
         CleanData(checked_array(f"clean data set {k}", one), noise, bool(again), float(distance))
         for k, (one, noise, again, distance) in enumerate(
-            zip(residuals, noises, same, apart, strict=True)
+            zip(residuals, noises, same, away, strict=True)
         )
     ]
     _check_clean(clean)
@@ -281,10 +291,7 @@ def _check_clean(clean: Sequence[CleanData]) -> None:
             raise ValueError(f"clean data set {k} must not be infinite; NaN is a missing sample")
         if not np.isfinite(residual).any():
             raise ValueError(f"clean data set {k} has no finite value; leave it out")
-        if not hasattr(noise, "covariance"):
-            raise ValueError(
-                f"noises[{k}] must be a Noise, such as KnownNoise(0.01), got {noise!r:.100}"
-            )
+        check_noise(f"noises[{k}]", noise)
     if len(shapes) > 1:
         raise ValueError(
             f"repetitions of one experiment must be of one shape, got {sorted(shapes)}"
@@ -293,7 +300,7 @@ def _check_clean(clean: Sequence[CleanData]) -> None:
 
 def _weights(clean: Sequence[CleanData]) -> np.ndarray:
     """Weights by the distance of regimes; the nearest has weight 1."""
-    square = np.array([one.away**2 for one in clean])
+    square = np.array([one.regime_distance**2 for one in clean])
     return np.maximum(np.exp(-0.5 * (square - np.min(square, initial=np.inf))), MIN_WEIGHT)
 
 

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from .held_out import Gap, holds
 from .hypothesis import Hypothesis
-from .misfit import Check
+from .misfit import ACCEPTANCE_LEVEL, Check
 from .verdict_kind import VerdictKind
 
 REJECTION_LEVEL = 0.05  # p-value below which the base model is rejected
-ACCEPTANCE_LEVEL = 0.01  # p-value above which an extended model is not
 MIN_GAIN = 2.0  # log likelihood below which an effect explains nothing
 FAR_BEHIND = 0.5  # of the best gain, below which one that does not pass is not worth more runs
 TIE_MARGIN = 4.0  # log likelihood by which one explanation must excel another
@@ -25,7 +25,8 @@ class Candidate:
         refitted: Whether runs near its best parameters were made for it; what was not is not
             accepted.
         needed: Whether, of several effects, each is needed.
-        held: Whether it held on the held-out data, where there were any.
+        gaps: On the held-out data, where it was compared with them.
+        predicted: Whether it could be simulated for the held-out data.
     """
 
     hypothesis: Hypothesis
@@ -33,11 +34,22 @@ class Candidate:
     gain: float
     refitted: bool = False
     needed: bool = True
-    held: bool = True
+    gaps: tuple[Gap, ...] = ()
+    predicted: bool = True
 
     @property
     def names(self) -> tuple[str, ...]:
         return self.hypothesis.names
+
+    @property
+    def held(self) -> bool:
+        """Whether it held on the held-out data, where there were any."""
+        return self.predicted and holds(self.gaps)
+
+    @property
+    def evidence(self) -> float:
+        """Log likelihood beyond the base model's, that of the held-out data included."""
+        return self.gain + sum(one.lpd_gain for one in self.gaps)
 
     @property
     def passes(self) -> bool:
@@ -80,8 +92,8 @@ def near_best(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
 
 def tied(candidates: Sequence[Candidate]) -> list[Candidate]:
     """The accepted ones that the data cannot tell from the best of them, best first."""
-    accepted = sorted((c for c in candidates if c.accepted), key=lambda c: -c.gain)
-    return [c for c in accepted if c.gain > accepted[0].gain - TIE_MARGIN]
+    accepted = sorted((c for c in candidates if c.accepted), key=lambda c: -c.evidence)
+    return [c for c in accepted if c.evidence > accepted[0].evidence - TIE_MARGIN]
 
 
 def conclude(

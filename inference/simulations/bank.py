@@ -2,7 +2,6 @@
 
 import json
 import logging
-import os
 import sqlite3
 import threading
 import time
@@ -17,7 +16,7 @@ import numpy as np
 from ..arguments import check_text, checked_integer
 from ..notebook_display import Displayed
 from .database import disk_errors, opened_database
-from .failures import Failure, FailureKind
+from .failures import Failure, failure_columns, failure_of
 from .simulation_locks import Claims
 
 logger = logging.getLogger(__name__)
@@ -127,7 +126,7 @@ class SimulationBank(Displayed):
             return None
         blob, dtype, shape, kind, text, seconds = kept
         signal = None if blob is None else _signal(blob, dtype, shape)
-        return Simulation(signal, kind and Failure(FailureKind(kind), text), seconds)
+        return Simulation(signal, failure_of(kind, text), seconds)
 
     def _is_whole(self, row: tuple, digest: bytes) -> bool:
         """Whether a row, see `_digest`, is as it was stored."""
@@ -153,9 +152,7 @@ class SimulationBank(Displayed):
         if simulation.signal is not None:
             signal = np.ascontiguousarray(simulation.signal)
             blob, dtype, shape = signal.tobytes(), signal.dtype.str, json.dumps(signal.shape)
-        failure = simulation.error
-        why = (None, None) if failure is None else (failure.kind.value, failure.text)
-        seconds = float(simulation.seconds)
+        why, seconds = failure_columns(simulation.error), float(simulation.seconds)
         row = (*_key(identity, theta, seed), blob, dtype, shape, *why, seconds)
         with self._lock, disk_errors(self.path):
             self._connection.execute(
@@ -214,11 +211,11 @@ class SimulationBank(Displayed):
         A claim lasts until `release`, or until the process ends. Look into the bank again after
         taking one: the last claimant may just have finished.
         """
-        return self._claims.take(_claim_key(identity, theta, seed))
+        return self._claims.take(json.dumps(_key(identity, theta, seed)))
 
     def release(self, identity: str, theta: Mapping[str, float], seed: int) -> None:
         """End a claim; nothing happens if there is none."""
-        self._claims.give_back(_claim_key(identity, theta, seed))
+        self._claims.give_back(json.dumps(_key(identity, theta, seed)))
 
     def __len__(self) -> int:
         with self._lock:
@@ -236,33 +233,18 @@ class SimulationBank(Displayed):
         self.close()
 
 
-def check_bank(bank: object) -> None:
-    """Raise ValueError unless `bank` is a bank, or a path to one."""
-    if not isinstance(bank, SimulationBank | str | os.PathLike) or not str(bank):
-        raise ValueError(f"bank must be the path of a file or a SimulationBank, got {bank!r:.100}")
-
-
-def theta_key(theta: Mapping[str, float]) -> str:
-    """Canonical text of theta; `repr` of a float64 round-trips exactly.
-
-    Raises:
-        ValueError: not names and numbers.
-    """
-    try:
-        return json.dumps({name: float(theta[name]) for name in sorted(theta)})
-    except (TypeError, ValueError, KeyError) as error:
-        raise ValueError(f"theta must map names to numbers, got {theta!r:.100}") from error
-
-
 def _key(identity: str, theta: Mapping[str, float], seed: int) -> tuple[str, str, int]:
-    """What a row is found by.
+    """Identity, canonical text of theta (`repr` of a float64 round-trips exactly) and seed.
 
     Raises:
         ValueError: no text, no names and numbers, or no integer.
     """
     check_text("identity", identity)
     whole = checked_integer("seed", seed, -LARGEST_SEED - 1, LARGEST_SEED)
-    return identity, theta_key(theta), whole
+    try:
+        return identity, json.dumps({name: float(theta[name]) for name in sorted(theta)}), whole
+    except (TypeError, ValueError, KeyError) as error:
+        raise ValueError(f"theta must map names to numbers, got {theta!r:.100}") from error
 
 
 def _digest(row: tuple) -> bytes:
@@ -273,7 +255,3 @@ def _digest(row: tuple) -> bytes:
 
 def _signal(blob: bytes, dtype: str, shape: str) -> np.ndarray:
     return np.frombuffer(blob, np.dtype(dtype)).reshape(json.loads(shape)).copy()
-
-
-def _claim_key(identity: str, theta: Mapping[str, float], seed: int) -> str:
-    return json.dumps(_key(identity, theta, seed))

@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..arguments import check_timeout, checked_integer
-from .bank import SimulationBank, check_bank
-from .executors import Workers, check_executor, open_executor
+from .bank import SimulationBank
+from .executors import Workers, open_executor
 
 
 @dataclass(frozen=True)
@@ -63,11 +63,8 @@ def open_compute(
         ImportError, ConnectionError: Dask is not installed, or no scheduler answers.
     """
     checked = Compute(None, timeout, batch)
-    check_executor(executor)
-    if bank is not None:
-        check_bank(bank)
     with ExitStack() as stack:
+        workers = stack.enter_context(open_executor(executor, one_thread=one_thread))
         if bank is not None and not isinstance(bank, SimulationBank):
             bank = stack.enter_context(SimulationBank(bank))
-        workers = stack.enter_context(open_executor(executor, one_thread=one_thread))
-        yield Compute(workers, checked.timeout, checked.batch, bank)
+        yield replace(checked, executor=workers, bank=bank)

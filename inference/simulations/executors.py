@@ -3,8 +3,8 @@
 import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import contextmanager
-from typing import Any, Protocol, cast, runtime_checkable
+from contextlib import ExitStack, contextmanager
+from typing import Any, Protocol, runtime_checkable
 
 
 @runtime_checkable
@@ -40,31 +40,22 @@ def open_executor(
         ImportError: an address, but Dask is not installed.
         ConnectionError: no scheduler answers there.
     """
-    with _opened(executor) as opened:
+    with ExitStack() as stack:
+        given: object = executor
+        if isinstance(given, str):
+            given = stack.enter_context(_dask_client(given))
+        if isinstance(given, DaskClient) and not isinstance(given, Executor | type):
+            # impure: a simulation that is asked for again failed before, and is to be tried again
+            given = given.get_executor(pure=False)
+        opened = _checked(given)
         if one_thread:
             _check_one_thread(opened)
         yield opened
 
 
-@contextmanager
-def _opened(executor: Workers | None) -> Iterator[Executor | None]:
-    if isinstance(executor, str):
-        with _dask(executor) as found:
-            yield found
-        return
-    if isinstance(executor, DaskClient) and not isinstance(executor, Executor | type):
-        yield executor.get_executor(pure=False)
-        return
-    check_executor(executor)
-    yield cast(Executor | None, executor)
-
-
-def check_executor(executor: object) -> None:
-    """Raise ValueError unless simulations can run there; whether a scheduler answers is not
-    asked."""
-    if executor is None or (isinstance(executor, DaskClient) and not isinstance(executor, type)):
-        return
-    if not isinstance(executor, Executor | str):
+def _checked(executor: object) -> Executor | None:
+    """The executor, or ValueError if no simulations can run there."""
+    if not isinstance(executor, Executor | None):
         raise ValueError(
             "executor must be a concurrent.futures.Executor, a Dask client, the address of a Dask "
             f"scheduler or None, got {executor!r:.100} of type {type(executor).__name__}"
@@ -74,6 +65,7 @@ def check_executor(executor: object) -> None:
             "executor starts its workers by fork, which JAX's threads do not survive; give "
             "ProcessPoolExecutor(n, mp_context=multiprocessing.get_context('spawn'))"
         )
+    return executor
 
 
 def _check_one_thread(executor: Executor | None) -> None:
@@ -82,19 +74,14 @@ def _check_one_thread(executor: Executor | None) -> None:
             "executor is a pool of threads, but the simulator serves only one thread of a process; "
             "give ProcessPoolExecutor(n, mp_context=multiprocessing.get_context('spawn'))"
         )
-    for worker, threads in _dask_threads(executor).items():
+    client = getattr(executor, "_client", None)  # of Dask's executor; there is no public way
+    for worker, threads in client.nthreads().items() if isinstance(client, DaskClient) else ():
         if threads > 1:
             raise ValueError(
                 f"the Dask worker {worker} has {threads} threads, but the simulator serves only "
                 "one thread of a process; start workers by `dask worker ADDRESS --nthreads 1`, or "
                 "LocalCluster(threads_per_worker=1)"
             )
-
-
-def _dask_threads(executor: Executor | None) -> dict[str, int]:
-    """Threads of each worker that has joined a Dask executor's cluster; none of other executors."""
-    client = getattr(executor, "_client", None)  # there is no public way
-    return client.nthreads() if isinstance(client, DaskClient) else {}
 
 
 def _forks(pool: ProcessPoolExecutor) -> bool:
@@ -104,7 +91,8 @@ def _forks(pool: ProcessPoolExecutor) -> bool:
 
 
 @contextmanager
-def _dask(address: str) -> Iterator[Executor]:
+def _dask_client(address: str) -> Iterator[Any]:
+    """A client of the scheduler there, closed afterwards."""
     try:
         from distributed import Client  # pyright: ignore[reportMissingImports]
     except ModuleNotFoundError as err:
@@ -119,14 +107,12 @@ def _dask(address: str) -> Iterator[Executor]:
             f"as tcp://host:8786, or an executor itself: {err}"
         ) from err
     with client:
-        # impure: a simulation that is asked for again failed before, and is to be tried again
-        yield client.get_executor(pure=False)
+        yield client
 
 
-def workers_of(executor: Executor) -> int | None:
-    """Of a pool on this computer; None of others, such as clusters, whose workers die alone."""
-    pool = isinstance(executor, ProcessPoolExecutor | ThreadPoolExecutor)
-    return getattr(executor, "_max_workers", None) if pool else None  # there is no public way
+def is_pool(executor: Executor) -> bool:
+    """Whether it is a pool on this computer; of others, such as clusters, workers die alone."""
+    return isinstance(executor, ProcessPoolExecutor | ThreadPoolExecutor)
 
 
 def killed_its_worker(error: BaseException) -> bool:

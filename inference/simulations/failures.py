@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
+from typing import TypeGuard
 
 
 class FailureKind(StrEnum):
@@ -35,6 +36,21 @@ class Failure:
     def __str__(self) -> str:
         raised = self.kind is FailureKind.RAISED
         return self.text if raised else f"{self.kind}: {self.text}"
+
+
+def failure_columns(error: Failure | None) -> tuple[str | None, str | None]:
+    """Kind and text as a database keeps them; two None for success."""
+    return (None, None) if error is None else (error.kind.value, error.text)
+
+
+def failure_of(kind: str | None, text: str) -> Failure | None:
+    """The failure of two columns, see `failure_columns`."""
+    return None if kind is None else Failure(FailureKind(kind), text)
+
+
+def is_unusable(error: Failure | None) -> TypeGuard[Failure]:
+    """Whether the simulator returned something else than a signal."""
+    return error is not None and error.kind is FailureKind.UNUSABLE
 
 
 class NoSignals(ValueError):

@@ -17,7 +17,7 @@ import numpy as np
 from ..arguments import Unusable, check_callable, checked_integer, checked_mapping, float64
 from ..types import Simulator, SingleSimulator
 from .bank import Simulation
-from .failures import Failure, FailureKind, raised, timed_out, unusable
+from .failures import Failure, is_unusable, raised, timed_out, unusable
 from .returned import commonest, signals_of
 
 BATCH = 4  # runs in one call, or in flight, where nobody says how many
@@ -141,11 +141,6 @@ def batched(
     return OneByOne(cast(SingleSimulator, simulate), time_limit)
 
 
-def is_unusable(result: Simulation) -> bool:
-    """Whether the simulator returned something else than a signal."""
-    return result.error is not None and result.error.kind is FailureKind.UNUSABLE
-
-
 def of_one_shape(
     results: Sequence[Simulation], batch: Sequence[Job], shape: tuple[int, ...] | None
 ) -> list[Simulation]:
@@ -234,7 +229,7 @@ def run_batch(
     except (Exception, SystemExit) as error:
         if len(batch) > 1:
             made = [run_batch(simulate, [job], shape, timeout)[0] for job in batch]
-            if isinstance(error, Unusable) and all(map(is_unusable, made)):
+            if isinstance(error, Unusable) and all(is_unusable(one.error) for one in made):
                 # no run is right alone either: tell of the call that the user's code got
                 told = misshapen(simulate, batch, shape, error)
                 return [one._replace(error=told) for one in made]

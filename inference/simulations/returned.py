@@ -49,27 +49,18 @@ def told_signals(
             given = given.tolist()
         if not isinstance(given, list | tuple) or len(given) != n:
             raise
-        tried = [_float64_or_why(row) for row in given]
-        faults = [_fault(row, shape) for row in tried]
-        if n and all(faults):
+        tried = [_signal_or_fault(row, shape) for row in given]
+        if n and all(fault for _, fault in tried):
             raise
-    return [
-        row if isinstance(row, np.ndarray) and not why else None
-        for row, why in zip(tried, faults, strict=True)
-    ], faults
+    return [row for row, _ in tried], [fault for _, fault in tried]
 
 
-def _float64_or_why(row: object) -> np.ndarray | str:
+def _signal_or_fault(given: object, due: tuple[int, ...] | None) -> tuple[np.ndarray | None, str]:
     try:
-        return float64(row)
+        row = float64(given)
     except Unusable as bad:
-        return bad.got
-
-
-def _fault(row: np.ndarray | str, due: tuple[int, ...] | None) -> str:
-    if isinstance(row, str):
-        return row
-    return "" if due in (None, row.shape) else str(row.shape)
+        return None, bad.got
+    return (row, "") if due in (None, row.shape) else (None, str(row.shape))
 
 
 def commonest(shapes: list[tuple[int, ...]]) -> tuple[int, ...] | None:

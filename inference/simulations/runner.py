@@ -1,26 +1,19 @@
 """Simulating what the bank lacks: in batches here, or on an executor."""
 
 import pickle
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, wait
+from collections.abc import Callable, Sequence
+from concurrent.futures import BrokenExecutor, CancelledError, Future, wait
 from contextlib import ExitStack, nullcontext
 from functools import partial
+from itertools import batched
 from typing import NamedTuple
 
 from ..types import Simulator
 from .bank import Simulation, SimulationBank
 from .compute import Compute
-from .executors import killed_its_worker, workers_of
-from .failures import FailureKind, NoSignals, raised, unusable
-from .job import (
-    BATCH,
-    Batched,
-    Job,
-    OneByOne,
-    is_unusable,
-    of_one_shape,
-    run_batch,
-)
+from .executors import is_pool, killed_its_worker
+from .failures import FailureKind, NoSignals, is_unusable, raised, unusable
+from .job import BATCH, Batched, Job, OneByOne, of_one_shape, run_batch
 
 POLL_SECONDS = 0.2  # seconds between looks at what somebody else is simulating
 
@@ -55,8 +48,7 @@ class Runner:
 
     def __init__(self, simulate: Simulator, compute: Compute, identity: str = ""):
         self.simulate = simulate
-        self._misshapen_until = BATCH  # results, whatever the batch; 0 once another came
-        self._misshapen = 0
+        self._results = self._unusable = 0
         self._resources = ExitStack()
         own = SimulationBank() if compute.bank is None else nullcontext(compute.bank)
         self.bank = self._resources.enter_context(own)
@@ -113,18 +105,12 @@ class Runner:
             wait([outcome], timeout=POLL_SECONDS)
             self._begin()
         made = outcome.result()
-        self._check_first(made)
+        self._results += 1
+        if is_unusable(made.error):
+            self._unusable += 1
+            if self._unusable == self._results == BATCH:
+                raise NoSignals(made.error.text)
         return made
-
-    def _check_first(self, made: Simulation) -> None:
-        if not self._misshapen_until:
-            return
-        if made.error is None or not is_unusable(made):
-            self._misshapen_until = 0
-            return
-        self._misshapen += 1
-        if self._misshapen == self._misshapen_until:
-            raise NoSignals(made.error.text)
 
     def _begin(self) -> None:
         """Take from the bank or simulate whatever nobody else is simulating."""
@@ -141,11 +127,8 @@ class Runner:
                 self._release(order.outcome)
             else:
                 mine.append(order)
-        if self.executor is not None:
-            for part in self._shared_out(mine, self.executor):
-                self._submit(self.executor, part)
-        elif mine:
-            self._simulate_here(mine)
+        for part in batched(mine, self._together(len(mine))):
+            self._simulate(part)
 
     def _found(self, order: Order) -> bool:
         found = self.bank.get(self.identity, *order.job)
@@ -161,81 +144,65 @@ class Runner:
         order.outcome.set_result(found)
         return True
 
-    def _simulate_here(self, orders: list[Order]) -> None:
-        single = isinstance(self.simulate, OneByOne)  # each run is kept when it is finished
-        for part in [[order] for order in orders] if single else [orders]:
-            batch = [order.job for order in part]
-            made = run_batch(self.simulate, batch, orders[0].shape, self.timeout)
-            for order, simulation in zip(part, made, strict=True):
-                self._keep(order, simulation)
+    def _together(self, count: int) -> int:
+        """How many of so many runs are one call: here all of them, unless each is kept when it is
+        finished; of a pool as many as the simulator likes, even if a worker then idles, for half a
+        call takes nearly as long; elsewhere one, for a worker may die alone, and a call with it."""
+        if self.executor is None:
+            return 1 if isinstance(self.simulate, OneByOne) else max(count, 1)
+        if isinstance(self.simulate, Batched) and is_pool(self.executor):
+            return self.simulate.together
+        return 1
 
-    def _shared_out(self, orders: list[Order], executor: Executor) -> "Iterable[list[Order]]":
-        """What goes to the executor in one call: as much as the simulator likes, even if a worker
-        then idles: half a call takes nearly as long. One by one where a worker may die alone: a
-        call with it."""
-        pool = workers_of(executor) is not None
-        each = self.simulate.together if pool and isinstance(self.simulate, Batched) else 1
-        return (orders[start : start + each] for start in range(0, len(orders), each))
-
-    def _submit(self, executor: Executor, orders: list[Order]) -> None:
+    def _simulate(self, orders: Sequence[Order]) -> None:
+        """Make the runs in one call, here or on the executor."""
         batch = [order.job for order in orders]
         work = partial(run_batch, self.simulate, batch, orders[0].shape, self.timeout)
+        if self.executor is None:
+            for order, made in zip(orders, work(), strict=True):
+                self._keep(order, made)
+            return
         try:
-            future = executor.submit(work)
+            future = self.executor.submit(work)
         except Exception as error:
-            told = self._refused(error)
-            for order in orders:
-                self._fail(order, told)
+            self._fail(orders, self._explained(error, submitting=True))
             return
         self._submitted.add(future)
         future.add_done_callback(partial(self._receive, orders))
 
-    def _receive(self, orders: list[Order], future: "Future[list[Simulation]]") -> None:
+    def _receive(self, orders: Sequence[Order], future: "Future[list[Simulation]]") -> None:
         """Store what an executor finished; called by one of its threads."""
         self._submitted.discard(future)
         try:
             made = future.result()
         except BaseException as error:
             if not killed_its_worker(error):
-                told = self._explained(error)
-                for order in orders:
-                    self._fail(order, told)
+                self._fail(orders, self._explained(error))
                 return
             made = [Simulation(None, raised(error), 0.0) for _ in orders]
         for order, one in zip(orders, made, strict=True):
             try:
                 self._keep(order, one)
             except BaseException as error:  # for `result` to raise: nobody hears this thread
-                self._fail(order, error)
+                self._fail([order], error)
 
     def _keep(self, order: Order, made: Simulation) -> None:
-        if not is_unusable(made):  # which the next call tries again, as it does what raised
+        if not is_unusable(made.error):  # which the next call tries again, as it does what raised
             self.bank.put(self.identity, *order.job, made)
         self._release(order.outcome)
         order.outcome.set_result(made)
 
-    def _fail(self, order: Order, error: BaseException) -> None:
-        self._release(order.outcome)
-        order.outcome.set_exception(error)
+    def _fail(self, orders: Sequence[Order], error: BaseException) -> None:
+        for order in orders:
+            self._release(order.outcome)
+            order.outcome.set_exception(error)
 
     def _release(self, outcome: "Future[Simulation]") -> None:
         job = self._mine.pop(outcome, None)
         if job is not None:
             self.bank.release(self.identity, *job)
 
-    def _refused(self, error: Exception) -> BaseException:
-        """What to tell the user of an executor that takes no simulation."""
-        told = self._explained(error)
-        if told is not error or not isinstance(error, RuntimeError):
-            return told
-        told = RuntimeError(
-            f"executor takes no simulation ({error}); give one that is open, which nobody has shut "
-            f"down. {self.bank.where}"
-        )
-        told.__cause__ = error
-        return told
-
-    def _explained(self, error: BaseException) -> BaseException:
+    def _explained(self, error: BaseException, submitting: bool = False) -> BaseException:
         """What to tell the user of an executor's own error."""
         if _is_of_pickling(error, self.simulate):
             told = TypeError(
@@ -249,6 +216,10 @@ class Runner:
                 "memory, crashed in the simulator or could not import it. "
                 f"In flight: {jobs}. {self.bank.where}; "
                 "mend the cause and repeat the call with a new executor to go on from there"
+            )
+        elif submitting and isinstance(error, RuntimeError):
+            told = RuntimeError(
+                f"the executor is shut down ({error}); pass an open one. {self.bank.where}"
             )
         else:
             return error
@@ -308,12 +279,11 @@ def run_missing(
     Raises:
         NoSignals: the simulator returned something else than signals for all of the first runs.
     """
-    shared_out = compute.executor is not None
-    at_once = compute.batch if compute.batch is not None and not shared_out else len(jobs)
+    at_once = None if compute.executor is not None else compute.batch
     results = []
     with Runner(simulate, compute, identity) as runner:
-        for start in range(0, len(jobs), max(at_once, 1)):
-            for outcome in runner.start(jobs[start : start + at_once], shape):
+        for part in batched(jobs, at_once or max(len(jobs), 1)):
+            for outcome in runner.start(part, shape):
                 results.append(runner.result(outcome))
                 advance(1)
     return of_one_shape(results, jobs, shape)

@@ -148,7 +148,7 @@ def test_telling_nothing_changes_nothing(prior, observed):
 def test_an_executor_that_was_shut_down_is_named(prior, observed, simulate):
     with ThreadPoolExecutor(1) as pool:
         pass
-    with pytest.raises(RuntimeError, match="executor takes no simulation .*shut"):
+    with pytest.raises(RuntimeError, match="the executor is shut down .*shutdown"):
         inference.fit(simulate, prior, observed, budget=9, executor=pool)
 
 

@@ -6,7 +6,6 @@ a kind, but has no case here, fails.
 """
 
 import inspect
-import typing
 from dataclasses import replace
 
 import jax
@@ -57,11 +56,9 @@ def is_pipeline(one):
 
 
 def is_check(one):
-    """A function whose first argument may be `Replicates`."""
+    """A function of `Replicates`."""
     given = inspect.signature(one).parameters.values() if inspect.isfunction(one) else ()
-    return any(
-        inference.checks.Replicates in typing.get_args(argument.annotation) for argument in given
-    )
+    return any(argument.annotation is inference.checks.Replicates for argument in given)
 
 
 # What is exported has a name or a case.
@@ -102,10 +99,10 @@ def pipelines(simulate, prior):
     options = {"surrogate": "discrepancy"}
     short = {"sampler": "emcee", "chains": 2, "draws": 64, "warmup": 20}
     return {
-        inference.FitPipeline: inference.FitPipeline(simulate, prior, 8, options, short),
-        inference.checks.SharedDesign: inference.shared_design(
-            simulate, prior, 10, options=options, sampling=short
-        ),
+        inference.FitPipeline: [
+            inference.FitPipeline(simulate, prior, 8, options, short),
+            inference.shared_design(simulate, prior, 10, options=options, sampling=short),
+        ]
     }
 
 
@@ -205,11 +202,14 @@ def test_a_check_keeps_its_protocol(made, name):
 
 @pytest.mark.parametrize("kind", exported(is_pipeline))
 def test_a_pipeline_keeps_its_protocol(pipelines, prior, observed, kind):
-    pipeline = pipelines[exported(is_pipeline)[kind]]
-    (drawn, log_density), (again, _), (other, _) = (pipeline(observed, seed) for seed in (0, 0, 1))
-    for name in prior.names:
-        values = drawn["posterior"][name]
-        assert values.dims == ("chain", "draw") and values.dtype == np.float64 and finite(values)
-        np.testing.assert_array_equal(values, again["posterior"][name])
-        assert not np.array_equal(values, other["posterior"][name])
-    assert log_density({name: np.full(3, 0.5) for name in prior.names}).shape == (3,)
+    for pipeline in pipelines[exported(is_pipeline)[kind]]:
+        (drawn, log_density), (again, _), (other, _) = (
+            pipeline(observed, seed) for seed in (0, 0, 1)
+        )
+        for name in prior.names:
+            values = drawn["posterior"][name]
+            assert values.dims == ("chain", "draw") and values.dtype == np.float64
+            assert finite(values)
+            np.testing.assert_array_equal(values, again["posterior"][name])
+            assert not np.array_equal(values, other["posterior"][name])
+        assert log_density({name: np.full(3, 0.5) for name in prior.names}).shape == (3,)

@@ -272,5 +272,3 @@ def test_arguments_are_checked(options, said):
         run(**options)
     with pytest.raises(ValueError, match="simulate is needed"):
         inference.replicates(Guess())
-    with pytest.raises(ValueError, match="made already"):
-        inference.sbc(run(n=2), n=3)

@@ -9,7 +9,7 @@ from bolfi_liquids.inference.criticism.measurement_noise import samples
 from bolfi_liquids.inference.criticism.misfit import locate, null_draws
 from bolfi_liquids.inference.criticism.posterior import weighted_posterior
 from bolfi_liquids.inference.criticism.prior_boxes import everywhere, fill
-from bolfi_liquids.inference.criticism.simulate import SimulatorRuns
+from bolfi_liquids.inference.criticism.study import Study
 from bolfi_liquids.inference.simulations import Compute
 from bolfi_liquids.inference.surrogates import output_vectors
 from scipy.stats import binom, chi2, norm
@@ -33,8 +33,9 @@ def oscillate(theta, seeds):
 
 
 def fitted(simulate, observed, noise, bank, count=RUNS):
-    simulator = SimulatorRuns(simulate, PRIOR, EXTENSIONS, Compute(batch=64), bank)
-    runs = simulator.run("start", fill(everywhere(1), PRIOR, bank, count))
+    experiment = criticism.Experiment(simulate, observed, noise)
+    study = Study(experiment, PRIOR, EXTENSIONS, Compute(batch=64), seed=bank)
+    runs = study.run("start", fill(everywhere(1), PRIOR, bank, count))
     return hypothesise((), PRIOR, runs, observed, noise, everywhere(1))
 
 
@@ -168,8 +169,10 @@ def test_a_posterior_allows_for_what_is_not_known_of_the_usual_residuals_size(si
     usual = criticism.UsualResidual(np.append(sd**2, np.zeros(n - 1)), freedom)
     noise = criticism.SumOfNoises((criticism.KnownNoise(1e-4), usual))
     observed = 0.3 + size * sd * rng.normal(size=n)
-    simulator = SimulatorRuns(level, prior, EXTENSIONS, Compute(batch=64))
-    runs = simulator.run("start", fill(everywhere(1), prior, 0, 12))
+    experiment = criticism.Experiment(level, observed, noise)
+    runs = Study(experiment, prior, EXTENSIONS, Compute(batch=64)).run(
+        "start", fill(everywhere(1), prior, 0, 12)
+    )
     found = weighted_posterior(hypothesise((), prior, runs, observed, noise, everywhere(1)))
     draws, weights = found.theta["level"], found.weights
     spread = np.sqrt(np.average((draws - np.average(draws, weights=weights)) ** 2, weights=weights))

@@ -7,11 +7,11 @@ import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference._float64 import in_float64
-from bolfi_liquids.inference.criticism.clean_scores import scored_on_clean
 from bolfi_liquids.inference.criticism.measurement_noise import gaussian, samples
 from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws
-from bolfi_liquids.inference.criticism.search import Study, examine
-from bolfi_liquids.inference.criticism.simulate import SimulatorRuns
+from bolfi_liquids.inference.criticism.search import examine
+from bolfi_liquids.inference.criticism.signatures import scored_on_clean
+from bolfi_liquids.inference.criticism.study import Study
 from bolfi_liquids.inference.criticism.usual_residual import REPEATED
 from bolfi_liquids.inference.simulations import Compute
 from bolfi_liquids.inference.surrogates.emulator import latent_covariance
@@ -62,8 +62,8 @@ def observe(simulate, number, bump=0.0):
 
 
 def examined(simulate, observed, bank):
-    simulator = SimulatorRuns(simulate, PRIOR, EXTENSIONS, Compute(batch=64), bank)
-    return examine(Study(simulator, observed, NOISE, criticism.Plan()), None)[0]
+    experiment = criticism.Experiment(simulate, observed, NOISE)
+    return examine(Study(experiment, PRIOR, EXTENSIONS, Compute(batch=64), seed=bank), None)[0]
 
 
 def on(hypothesis, observed):
@@ -278,8 +278,9 @@ def test_what_clean_data_show_as_well_is_no_discovery(banks):
 def test_a_prior_says_on_which_side_an_effect_can_act(low, high, side):
     extensions = {"bump": criticism.Extension(dist.Uniform(low, high))}
     observed = observe(exact, 3)
-    simulator = SimulatorRuns(exact, PRIOR, extensions, Compute(batch=64))
-    found = examine(Study(simulator, observed, NOISE, criticism.Plan()), None)[0].signatures
+    experiment = criticism.Experiment(exact, observed, NOISE)
+    study = Study(experiment, PRIOR, extensions, Compute(batch=64))
+    found = examine(study, None)[0].signatures
     assert found["bump"].side == side
     assert found["bump"].change @ BUMP > 0.0  # towards a greater coefficient, on either side
 

@@ -251,7 +251,7 @@ def test_what_is_learned_in_another_regime_counts_little(clean):
     expected = alone.autocovariance
     np.testing.assert_allclose(beside.autocovariance, expected, atol=1e-3 * expected[0])
     assert beside.freedom == pytest.approx(2.0, abs=1e-3)
-    with pytest.raises(ValueError, match="away must be 2 finite numbers"):
+    with pytest.raises(ValueError, match="regime_distance must be 2 finite numbers"):
         criticism.usual_residual(two, none[:2], [True, True], [1.0, np.nan])
 
 
@@ -283,7 +283,7 @@ def test_what_the_others_teach_is_learned_in_the_regime_of_the_one_left_out(clea
 
 def test_one_whose_regime_the_others_do_not_tell_of_is_not_judged(clean):
     found = criticism.usual_residual(clean[:3], [NOTHING] * 3, [True] * 3, [0.0, 0.3, 6.0])
-    assert [one.away for one, *_ in found.leave_one_out()] == [0.0, 0.3]
+    assert [one.regime_distance for one, *_ in found.leave_one_out()] == [0.0, 0.3]
 
 
 def test_a_simulator_that_leaves_nothing_leaves_nothing(clean):

@@ -4,11 +4,10 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference import criticism
-from bolfi_liquids.inference.criticism.hypothesis import hypothesise
 from bolfi_liquids.inference.criticism.posterior import weighted_posterior
 from bolfi_liquids.inference.criticism.prior_boxes import PriorBox, fill, hull, intersection, sides
-from bolfi_liquids.inference.criticism.search import Study, examine, explain
-from bolfi_liquids.inference.criticism.simulate import SimulatorRuns
+from bolfi_liquids.inference.criticism.search import examine, explain
+from bolfi_liquids.inference.criticism.study import Study
 from bolfi_liquids.inference.simulations import Compute
 
 from bolfi_liquids import inference
@@ -25,9 +24,9 @@ def ramp(theta, seeds):
     return theta["level"][:, None] + size[:, None] * (1.0 + 0.5 * TIME**2)
 
 
-@pytest.fixture
-def simulator():
-    return SimulatorRuns(ramp, PRIOR, EXTENSIONS, Compute(batch=64))
+def study_of(data):
+    experiment = criticism.Experiment(ramp, data, NOISE)
+    return Study(experiment, PRIOR, EXTENSIONS, Compute(batch=64))
 
 
 def observed(level, size=0.0):
@@ -64,20 +63,21 @@ def test_effects_are_tried_on_both_sides_of_neutral_or_on_the_only_one(prior, ne
 
 
 @pytest.mark.slow
-def test_best_fit_and_posterior_stay_where_the_model_was_simulated(simulator):
+def test_best_fit_and_posterior_stay_where_the_model_was_simulated():
     """Data that lie beyond draw both to the end and no further."""
     within = PriorBox(np.array([0.2]), np.array([0.5]))
-    runs = simulator.run("start", fill(within, PRIOR, 0, 12))
-    found = hypothesise((), PRIOR, runs, observed(1.5), NOISE, within)
+    study = study_of(observed(1.5))
+    runs = study.run("start", fill(within, PRIOR, 0, 12))
+    found = study.hypothesis((), runs, within)
     assert found.u[0] == pytest.approx(0.5, abs=0.01)
     level = weighted_posterior(found).draw(0, 200)["level"]
     assert level.max() < 4.0 * 0.55 - 2.0
 
 
 @pytest.mark.slow
-def test_a_truth_outside_of_the_box_of_the_model_without_the_effect_is_reached(simulator):
+def test_a_truth_outside_of_the_box_of_the_model_without_the_effect_is_reached():
     """The base model fits best at 1.6, half of the prior's range away."""
-    study = Study(simulator, observed(0.0, 1.4), NOISE, criticism.Plan())
+    study = study_of(observed(0.0, 1.4))
     base, _ = examine(study, None)
     assert not base.box.encloses(np.array([0.5]))
     _, accepted = explain(study, base)

@@ -16,6 +16,8 @@ from bolfi_liquids import inference
 
 REJECTED = criticism.Check(0.001, 0.001, 0.2, {})
 FITS = criticism.Check(0.4, 0.3, 0.5, {})
+CONFIRMS = criticism.Gap("", 1.0, 0.3, 0.3, 0.2, 0.4, 0.5, 5.0)
+REFUTES = CONFIRMS._replace(p_value=0.001)
 
 
 def candidate(*names, gain, p_value=0.4, **more):
@@ -54,6 +56,15 @@ def test_explanations_that_are_nearly_as_good_are_tied(behind, kind):
     assert verdict(tilt, drag) == (kind, ("drag", "tilt") if kind == "tie" else ("drag",))
 
 
+def test_held_out_data_tell_explanations_apart():
+    """Their evidence adds to the gain on the fitted data."""
+    drag, tilt = candidate("drag", gain=20.0), candidate("tilt", gain=18.0)
+    confirmed = [replace(one, gaps=(CONFIRMS,)) for one in (drag, tilt)]
+    assert verdict(*confirmed) == ("tie", ("drag", "tilt"))
+    better = replace(tilt, gaps=(CONFIRMS._replace(lpd_gain=12.0),))
+    assert verdict(confirmed[0], better) == ("effect", ("tilt",))
+
+
 def test_effects_of_tied_pairs_are_named_once():
     pairs = candidate("drag", "tilt", gain=20.0), candidate("drag", "delay", gain=19.0)
     assert verdict(*pairs) == ("tie", ("drag", "tilt", "delay"))
@@ -64,21 +75,23 @@ def test_effects_of_tied_pairs_are_named_once():
     [
         candidate("drag", gain=20.0, p_value=0.01),
         candidate("drag", gain=2.0),
-        candidate("drag", gain=20.0, held=False),
+        candidate("drag", gain=20.0, predicted=False),
+        candidate("drag", gain=20.0, gaps=(REFUTES,)),
         candidate("drag", gain=20.0, refitted=False),
         candidate("drag", gain=20.0, needed=False),
     ],
-    ids=["does not fit", "gains nothing", "does not hold", "not refitted", "not needed"],
+    ids=["misfit", "gains nothing", "not predicted", "refuted", "not refitted", "not needed"],
 )
 def test_what_explains_nothing_is_not_named(poor):
     assert verdict(poor) == ("unknown", ())
-    better = replace(poor, check=FITS, gain=20.0, held=True, refitted=True, needed=True)
+    good = {"gaps": (), "predicted": True, "refitted": True, "needed": True}
+    better = replace(poor, check=FITS, gain=20.0, **good)
     assert verdict(better) == ("effect", ("drag",))
 
 
 def test_held_out_data_decide_only_where_there_is_something_to_explain():
     """An effect may be tried on data with which the base model agrees, if the user asks."""
-    refuted = [candidate("drag", gain=20.0, held=False)]
+    refuted = [candidate("drag", gain=20.0, predicted=False)]
     found = conclude(REJECTED, refuted)
     assert (found.kind, found.effects) == ("unknown", ())
     assert "drag" in found.reason and found.reason != conclude(REJECTED, []).reason

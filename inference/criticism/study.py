@@ -1,0 +1,195 @@
+"""An experiment, the model that should explain it, and runs of the model that are kept."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from ..arguments import checked_integer
+from ..prior import Prior
+from ..simulations.compute import Compute
+from ..simulations.failures import NoSignals
+from ..simulations.job import jobs, succeeded
+from ..simulations.runner import run_missing
+from .experiment import Experiment, Proposal
+from .hypothesis import Hypothesis, hypothesise
+from .misfit import Check, check, null_draws
+from .model_extension import Extensions, extended
+from .prior_boxes import PriorBox, fill
+from .runs import Runs
+from .signatures import Signature
+
+MIN_EFFECT_RUNS = 2
+
+Report = Callable[[str, int], object]
+"""(phase, simulations finished in it since the last call)"""
+
+
+class AllRunsFailed(RuntimeError):
+    """Every simulation of a phase failed; the message has the first one's error."""
+
+
+def silent(phase: str, finished: int) -> None:
+    """Reports nothing."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How many runs each step may make.
+
+    Attributes:
+        base: Of the base model, near where it fits best, in each of up to six passes, beside
+            those there are already.
+        start: Of the base model all over the prior, where there are none yet.
+        extension: Of each effect, and of the base model with the same parameters and seeds.
+        look: Of each of twice as many effects as are refitted, where they seem to fit best.
+        refit: Near the best parameters of a near-best explanation, in each of up to four passes; up
+            to eight where few are refitted.
+        refits: Explanations that are refitted, and pairs of effects after them.
+        held_out: Of each model for each held-out data set.
+        most: Of looks and refits of single effects together, and as many of pairs of them; those
+            beyond are left out.
+    """
+
+    base: int = 8
+    start: int = 16
+    extension: int = 2
+    look: int = 4
+    refit: int = 8
+    refits: int = 4
+    held_out: int = 4
+    most: int = 160
+
+    def __post_init__(self) -> None:
+        for name, count in vars(self).items():
+            least = {"look": 0, "refits": 0, "most": 0, "extension": MIN_EFFECT_RUNS}
+            checked_integer(name, count, least.get(name, 1))
+
+
+@dataclass(frozen=True)
+class Study:
+    """What all steps of a criticism share.
+
+    Attributes:
+        experiment: The data, and the simulator that should explain them.
+        prior: Of the base parameters.
+        extensions: All that may act.
+        compute: Where runs are made and kept.
+        plan: How many runs each step may make.
+        seed: All seeds derive from it.
+        report: Called with the phase and the number of simulations finished in it.
+    """
+
+    experiment: Experiment
+    prior: Prior
+    extensions: Extensions
+    compute: Compute
+    plan: Plan = field(default_factory=Plan)
+    seed: int = 0
+    report: Report = silent
+
+    def run(self, phase: str, theta: Mapping[str, np.ndarray]) -> Runs:
+        """Simulate at theta, name -> [n]; runs that fail are left out.
+
+        Args:
+            phase: A word for what they are for; with the run's number it fixes the seeds.
+
+        Raises:
+            AllRunsFailed: all of them did.
+            RuntimeError: the executor lost its workers.
+        """
+        (made,) = self.run_each(phase, [theta])
+        if not len(made):
+            raise AllRunsFailed(made.error)
+        return made
+
+    def run_each(
+        self,
+        phase: str,
+        thetas: Sequence[Mapping[str, np.ndarray]],
+        elsewhere: Experiment | Proposal | None = None,
+    ) -> list[Runs]:
+        """The same at several theta in one call; the k-th run of each has the same seed.
+
+        So what they differ by is not chance. Where all runs at a theta fail, there are none of it.
+
+        Args:
+            elsewhere: Another experiment to simulate.
+
+        Raises:
+            RuntimeError: the executor lost its workers.
+        """
+        made_for = elsewhere or self.experiment
+        counts = [len(next(iter(theta.values()))) for theta in thetas]
+        seeds = phase_seeds(self.seed, phase, max(counts, default=0))
+        asked = [jobs(theta, seeds[:n]) for theta, n in zip(thetas, counts, strict=True)]
+        try:
+            results = run_missing(
+                made_for.simulate,
+                sum(asked, []),
+                self.compute,
+                made_for.shape,
+                identity=made_for.identity,
+                advance=partial(self.report, phase),
+            )
+        except NoSignals as error:
+            if len(thetas) > 1:  # those of others may return some
+                return [self.run_each(phase, [theta], elsewhere)[0] for theta in thetas]
+            why = f"no simulation of the phase {phase!r} returned a signal: {error}"
+            return [self._none(thetas[0], made_for.shape, why)]
+        runs = []
+        for theta, batch in zip(thetas, asked, strict=True):
+            own, results = results[: len(batch)], results[len(batch) :]
+            good = succeeded(own)
+            if good:
+                rows = list(good)
+                at = {name: np.asarray(column, float)[rows] for name, column in theta.items()}
+                runs.append(self.table(at, np.stack(list(good.values())), seeds[rows]))
+                continue
+            why = (
+                f"all {len(own)} simulations of the phase {phase!r} failed, the first at "
+                f"{batch[0].theta}: {own[0].error or 'its output is not finite'}"
+            )
+            runs.append(self._none(theta, made_for.shape, why))
+        return runs
+
+    def _none(self, theta: Mapping[str, np.ndarray], shape: tuple[int, ...], error: str) -> Runs:
+        nowhere = {name: np.zeros(0) for name in theta}
+        return self.table(nowhere, np.zeros((0, *shape)), np.zeros(0, np.int64), error)
+
+    def table(
+        self,
+        theta: Mapping[str, np.ndarray],
+        signals: np.ndarray,
+        seeds: np.ndarray,
+        error: str = "",
+    ) -> Runs:
+        """Simulations made elsewhere, coefficients that theta lacks being neutral."""
+        neutral = {name: one.neutral for name, one in self.extensions.items()}
+        whole = {name: np.full(len(seeds), value) for name, value in neutral.items()}
+        whole |= {name: np.asarray(theta[name], float) for name in theta.keys()}
+        return Runs(whole, neutral, signals, seeds, error)
+
+    def hypothesis(self, names: tuple[str, ...], runs: Runs, within: PriorBox) -> Hypothesis:
+        """The model in which the named effects act, fitted where it was simulated."""
+        prior, data = extended(self.prior, self.extensions, names), self.experiment
+        return hypothesise(names, prior, runs, data.corrected, data.noise, within)
+
+    def points(self, box: PriorBox, names: tuple[str, ...], count: int) -> dict[str, np.ndarray]:
+        """Parameters all over a box, name -> [count]."""
+        return fill(box, extended(self.prior, self.extensions, names), self.seed, count)
+
+    def check(
+        self, hypothesis: Hypothesis, signatures: Mapping[str, Signature]
+    ) -> tuple[Check, np.ndarray]:
+        """Its test, and residuals [m, n] of a right model."""
+        rng = np.random.default_rng(self.seed)
+        null = null_draws(hypothesis, self.experiment.noise, rng)
+        return check(hypothesis, signatures, null), null
+
+
+def phase_seeds(seed: int, phase: str, count: int) -> np.ndarray:
+    """Seeds in [0, 2^31), others for every phase."""
+    words = np.random.SeedSequence([seed, *phase.encode()]).generate_state(count)
+    return (words >> 1).astype(np.int64)
