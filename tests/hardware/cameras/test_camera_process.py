@@ -20,8 +20,8 @@ from bolfi_liquids.hardware.recorder.events import read_events  # noqa: E402
 from bolfi_liquids.hardware.recorder.rate import no_rate  # noqa: E402
 from bolfi_liquids.hardware.recorder.video import VideoWriter  # noqa: E402
 from bolfi_liquids.hardware.recorder.views import camera_model, stick_view  # noqa: E402
+from bolfi_liquids.hardware.rendering import Look, Scene  # noqa: E402
 from bolfi_liquids.hardware.rendering.drawing import prepare, render  # noqa: E402
-from bolfi_liquids.hardware.rendering.scene import Look, Scene  # noqa: E402
 from bolfi_liquids.hardware.rendering.world import WorldState  # noqa: E402
 from bolfi_liquids.hardware.rig_file import bundled_rig  # noqa: E402
 from bolfi_liquids.hardware.session.camera_process import _Tally as Tally  # noqa: E402
