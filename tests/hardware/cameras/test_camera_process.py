@@ -354,8 +354,8 @@ def test_lost_and_repeated_pictures_are_counted():
         image = np.full((480, 640), min(k, 3), np.uint8)
         tally = tallied(tally, meter.measure(Frame(index, k / 30, image)), 1.0 + k / 30)
     assert (tally.rate.total, tally.lost, tally.same) == (6, 5, 3)
-    assert tally.beat == pytest.approx(1.1)
-    assert tally.worst == pytest.approx(1 / 30)
+    assert tally.row.beat == pytest.approx(1.1)
+    assert tally.row.worst == pytest.approx(1 / 30)
 
 
 @pytest.mark.minutes
