@@ -1,10 +1,10 @@
 from . import motion as motion
 from . import vision as vision
 from .arm import Tool as Tool
+from .emulated.motion import servoed as servoed
 from .emulated.rig import EmulatedRig as EmulatedRig
 from .emulated.rig import HiddenLiquid as HiddenLiquid
 from .emulated.rig import emulated as emulated
-from .emulated.servoed_path import servoed as servoed
 from .emulated.stick_motion import StickMotion as StickMotion
 from .errors import MotionRejected as MotionRejected
 from .errors import RigError as RigError

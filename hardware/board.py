@@ -35,6 +35,11 @@ class Who(IntEnum):
     CAMERA_XZ = 2
     CAMERA_YZ = 3
 
+    @property
+    def label(self) -> str:
+        """As a person reads it."""
+        return self.name.lower().replace("_", " ")
+
 
 class Trouble(IntEnum):
     """What a participant complains of."""

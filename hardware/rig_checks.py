@@ -66,10 +66,8 @@ def contradictions(rig: Rig) -> Faults:
         rig: Whose numbers are each within their ends.
     """
     yield from _sections(rig)
-    yield from _cameras_apart(rig)
-    yield from _speeds(rig)
-    yield from _stick(rig)
-    yield from _heights(rig)
+    for check in (_cameras_apart, _speeds, _stick, _heights):
+        yield from (RigFault("", what) for what in check(rig))
     if fault := receiver_fault(rig, MIN_CUP_RADIUS):
         yield RigFault("", fault)
     for number, camera in enumerate(rig.cameras):
@@ -140,21 +138,19 @@ def _boxes(rig: Rig) -> Faults:
                 yield RigFault("limits", what)
 
 
-def _cameras_apart(rig: Rig) -> Faults:
+def _cameras_apart(rig: Rig) -> Iterator[str]:
     first, second = rig.cameras
     if first.source == second.source and first.is_device:
-        what = f"cameras: both have the source {first.source!r}; each needs its own"
-        yield RigFault("", what)
+        yield f"cameras: both have the source {first.source!r}; each needs its own"
     slowest = min(first.rate, second.rate)
     if rig.limits.frame_age < 1.0 / slowest:
-        what = (
+        yield (
             f"limits.frame_age {rig.limits.frame_age} s is below the {1.0 / slowest:.3g} s from "
             "one picture of a camera to the next"
         )
-        yield RigFault("", what)
 
 
-def _speeds(rig: Rig) -> Faults:
+def _speeds(rig: Rig) -> Iterator[str]:
     stirring, limits = rig.stirring, rig.limits
     limited = (
         ("stirring.speed", stirring.speed, "speed", "m/s"),
@@ -164,56 +160,49 @@ def _speeds(rig: Rig) -> Faults:
     )
     for name, value, limit, unit in limited:
         if value > (most := getattr(limits, limit)):
-            yield RigFault("", f"{name} {value} {unit} is above limits.{limit} {most} {unit}")
+            yield f"{name} {value} {unit} is above limits.{limit} {most} {unit}"
 
 
-def _stick(rig: Rig) -> Faults:
+def _stick(rig: Rig) -> Iterator[str]:
     cup, stick, stirring = rig.cup, rig.stick, rig.stirring
     tip = stirring.height - stick.length
     if not 0.0 < tip < cup.fill:
-        what = (
+        yield (
             f"stirring.height: the stick's tip is {tip:.3f} m above the floor, "
             f"outside the liquid (cup.fill = {cup.fill} m)"
         )
-        yield RigFault("", what)
     if stirring.radius + stick.radius >= cup.radius:
-        what = (
+        yield (
             f"stirring.radius {stirring.radius} m brings the stick to the cup's wall "
             f"(cup.radius = {cup.radius} m)"
         )
-        yield RigFault("", what)
     if stick.mass >= rig.robot.payload:
-        what = (
+        yield (
             f"stick.mass {stick.mass} kg is not below robot.payload {rig.robot.payload} kg, of "
             "which the stick is a part"
         )
-        yield RigFault("", what)
     wet = cup.fill - tip
     lifted = rig.liquid.density * np.pi * stick.radius**2 * wet * (stick.length - wet / 2)
     if lifted >= stick.mass * stick.length / 2:  # moments about the pivot
-        what = (
+        yield (
             f"stick.mass {stick.mass} kg: the stick floats up in a liquid of "
             f"{rig.liquid.density:g} kg/m3 (liquid.density); it must hang"
         )
-        yield RigFault("", what)
 
 
-def _heights(rig: Rig) -> Faults:
+def _heights(rig: Rig) -> Iterator[str]:
     stick, stirring, z = rig.stick, rig.stirring, rig.limits.stirring.z
     if z[0] <= stick.length:
-        what = (
+        yield (
             f"limits.stirring.z {z[0]} m lets the stick's tip reach the "
             f"cup's floor (stick.length = {stick.length} m)"
         )
-        yield RigFault("", what)
     if stirring.clear_height - stick.length <= rig.cup.height:
-        what = f"stirring.clear_height {stirring.clear_height} m leaves the stick in the cup"
-        yield RigFault("", what)
+        yield f"stirring.clear_height {stirring.clear_height} m leaves the stick in the cup"
     for name in ("height", "clear_height"):
         height = getattr(stirring, name)
         if not z[0] <= height <= z[1]:
-            what = f"stirring.{name} {height} m is outside of limits.stirring.z {list(z)} m"
-            yield RigFault("", what)
+            yield f"stirring.{name} {height} m is outside of limits.stirring.z {list(z)} m"
 
 
 def _camera(rig: Rig, camera: Camera, name: str) -> Faults:

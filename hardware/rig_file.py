@@ -5,14 +5,14 @@ from collections.abc import Iterator
 from difflib import get_close_matches
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from pydantic import ValidationError
 
 from .errors import RigError
 from .rig import Rig
 from .rig_checks import contradictions
-from .rig_numbers import COMPARE, RigFault, RigSection, beyond_their_ends
+from .rig_numbers import CHECK_ENDS, COMPARE, RigFault, RigSection
 
 BUNDLED = "rig.toml"
 
@@ -54,13 +54,10 @@ def checked_rig(rig: Rig, where: str = "rig") -> Rig:
 
 def _checked(written: dict[str, Any], where: str) -> Rig:
     """Rig of a file's content, after all checks."""
-    faults = list(_unknown(Rig, written))
     try:
-        rig = Rig.model_validate(written)
+        rig = Rig.model_validate(written, context=CHECK_ENDS, extra="forbid")
     except ValidationError as err:
-        raise _refusal([*faults, *_mistyped(err)], where) from err
-    if faults := faults or beyond_their_ends(rig):
-        raise _refusal(faults, where)
+        raise _refusal([*_faults(err)], where) from err
     for fault in contradictions(rig):
         raise _refusal([fault], where)
     return rig
@@ -75,31 +72,18 @@ def _refusal(faults: list[RigFault], where: str) -> RigError:
     return RigError(told, where=where, fix=COMPARE)
 
 
-def _mistyped(err: ValidationError) -> Iterator[RigFault]:
-    """Missing fields, and fields of a wrong type."""
+def _faults(err: ValidationError) -> Iterator[RigFault]:
+    """Missing and unknown fields, wrong types, numbers beyond their ends."""
+    known = {name for section in RigSection.__subclasses__() for name in section.model_fields}
     for one in err.errors(include_url=False, include_context=False):
-        message, given = one["msg"].removeprefix("Value error, "), one["input"]
-        what = message if isinstance(given, dict) else f"{message}, got {given!r:.60}"
-        yield RigFault(".".join(map(str, one["loc"])), what)
-
-
-def _unknown(kind: type[RigSection], written: Any, way: str = "") -> Iterator[RigFault]:
-    """Unknown fields, each with the most similar known one."""
-    for name, value in written.items() if isinstance(written, dict) else ():
-        if name in kind.model_fields:
-            yield from _unknown_within(kind.model_fields[name].annotation, value, f"{way}{name}")
-            continue
-        likely = get_close_matches(name, kind.model_fields, n=1)
-        hint = f"did you mean {likely[0]}?" if likely else f"known: {', '.join(kind.model_fields)}"
-        yield RigFault(f"{way}{name}", f"no such field ({hint})")
-
-
-def _unknown_within(annotation: Any, written: Any, name: str) -> Iterator[RigFault]:
-    if isinstance(annotation, type) and issubclass(annotation, RigSection):
-        yield from _unknown(annotation, written, f"{name}.")
-    elif isinstance(written, list | tuple):
-        for k, (part, kind) in enumerate(zip(written, get_args(annotation), strict=False)):
-            yield from _unknown_within(kind, part, f"{name}.{k}")
+        name, given = ".".join(map(str, one["loc"])), one["input"]
+        what = one["msg"].removeprefix("Value error, ")
+        if one["type"] == "extra_forbidden":
+            likely = get_close_matches(str(one["loc"][-1]), known, n=1)
+            what = f"no such field (did you mean {likely[0]}?)" if likely else "no such field"
+        elif one["type"] != "value_error" and not isinstance(given, dict):
+            what = f"{what}, got {given!r:.60}"
+        yield RigFault(name, what)
 
 
 def _beside(rig: Rig, directory: Path) -> Rig:

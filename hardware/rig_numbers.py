@@ -1,16 +1,18 @@
 """Numbers that a rig.toml may hold: each with a lower and an upper end, its unit, and why.
 
 The ends keep an arm from doing harm. They are checked where a rig.toml is opened and before a
-session starts; the rig of a recording, by which nothing moves any more, is read without them.
+session starts, by `CHECK_ENDS` as the context of the validation; the rig of a recording, by which
+nothing moves any more, is read without them.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple, get_args
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel
+from pydantic import BaseModel, GetCoreSchemaHandler, ValidationInfo
+from pydantic_core import CoreSchema, core_schema
 
+CHECK_ENDS = "check ends"
 COMPARE = "compare with the bundled rig.toml (SI units unless the name says otherwise)"
 
 
@@ -41,10 +43,19 @@ class Within:
     unit: str
     why: str
 
-    def message(self, value: float) -> str:
-        """Message for a value outside of the ends."""
-        unit = f" {self.unit}".rstrip()
-        return f"{value:g}{unit} is not within {self.low:g} to {self.high:g}{unit}: {self.why}"
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.with_info_after_validator_function(self._checked, handler(source))
+
+    def _checked(self, value: Any, info: ValidationInfo) -> Any:
+        """The value; a text or None, where the field allows that, has no ends."""
+        is_number = isinstance(value, int | float)
+        if info.context == CHECK_ENDS and is_number and not self.low <= value <= self.high:
+            unit = f" {self.unit}".rstrip()
+            ends = f"{self.low:g} to {self.high:g}{unit}"
+            raise ValueError(f"{value:g}{unit} is not within {ends}: {self.why}")
+        return value
 
 
 Coordinate = Annotated[float, Within(-3.0, 3.0, "m", "more looks like millimetres")]
@@ -78,30 +89,3 @@ Point = tuple[Coordinate, Coordinate, Coordinate]
 Turn = tuple[Angle, Angle, Angle]
 Tcp = tuple[Aside, Aside, Ahead, Angle, Angle, Angle]
 Balance = tuple[Aside, Aside, MountedAhead]
-
-
-def numbers(section: RigSection, way: str = "") -> Iterator[tuple[str, float, Within | None]]:
-    """Field, value and ends of each number of a section and of the sections in it."""
-    for name, field in type(section).model_fields.items():
-        yield from _numbers(getattr(section, name), field.annotation, field.metadata, way + name)
-
-
-def _numbers(
-    value: Any, annotation: Any, metadata: Any, name: str
-) -> Iterator[tuple[str, float, Within | None]]:
-    if isinstance(value, RigSection):
-        yield from numbers(value, f"{name}.")
-    elif isinstance(value, tuple):
-        for k, (part, kind) in enumerate(zip(value, get_args(annotation), strict=True)):
-            yield from _numbers(part, kind, getattr(kind, "__metadata__", ()), f"{name}.{k}")
-    elif isinstance(value, int | float) and not isinstance(value, bool):
-        yield name, value, next((one for one in metadata if isinstance(one, Within)), None)
-
-
-def beyond_their_ends(section: RigSection) -> list[RigFault]:
-    """Faults of all numbers outside of their ends."""
-    return [
-        RigFault(name, ends.message(value))
-        for name, value, ends in numbers(section)
-        if ends is not None and not ends.low <= value <= ends.high
-    ]

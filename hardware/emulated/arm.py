@@ -8,8 +8,7 @@ import numpy as np
 from ..arm import WATCHDOG_PERIOD, ArmState, LinkLost, Payload, Six, Tool
 from ..host_clock import REAL_CLOCK, HostClock
 from ..motion.cup_frame import cup_frame
-from ..rendering.shared_world import SharedWorld
-from ..rendering.world import WorldState
+from ..rendering.world import SharedWorld, WorldState
 from ..rig import Rig
 from ..safety.guards import NORMAL, PLAYING, RUNNING_MODE
 from ..safety.limits import TargetCheck, workspace

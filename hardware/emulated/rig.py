@@ -16,8 +16,8 @@ from ..host_clock import REAL_CLOCK
 from ..motion.cup_frame import cup_frame
 from ..motion.kinematics import inverse
 from ..recorder.names import truth_file
-from ..recorder.views import camera_model
-from ..rendering import BRIGHT_STICK, Look, Scene, SharedWorld, WorldState, prepare
+from ..recorder.views import camera_model, scene
+from ..rendering import BRIGHT_STICK, Look, SharedWorld, WorldState, prepare
 from ..rig import Rig, View
 from ..safety.limits import workspace
 from .arm import EmulatedController
@@ -111,18 +111,9 @@ def rendered_camera(
 ) -> RenderedCamera:
     """Open the rendered camera of one view, in the process that reads it."""
     camera = rig.camera(view)
-    scene = Scene(
-        marker_offset=camera.marker,
-        cup_radius=rig.cup.radius,
-        cup_height=rig.cup.height,
-        fill=rig.cup.fill,
-        stick_radius=rig.stick.radius,
-        stick_length=rig.stick.length,
-        marker_radius=camera.marker_radius,
-    )
     look = Look() if rig.stick.colour == "dark" else BRIGHT_STICK
     seed = 10 * seed + _SEEDS[view]
-    stage = prepare(scene, camera_model(camera), look, seed)
+    stage = prepare(scene(rig, view), camera_model(camera), look, seed)
     timing = Timing(rate=camera.rate, seed=seed)
     return RenderedCamera(
         stage, world, timing, truth=None if truth is None else truth / truth_file(view)

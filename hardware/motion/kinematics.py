@@ -14,6 +14,7 @@ import numpy as np
 
 from .poses import Numbers, matrix_pose, pose_matrix
 
+LARGEST_STEP = 0.3  # rad; a joint that moves further between two poses of a path jumps
 _TURNS = (1, 0, 0, 1, -1, 0)  # alpha, in right angles
 _Vector = tuple[float, float, float]
 
@@ -34,14 +35,12 @@ class DhArm(NamedTuple):
     """A six-axis arm of the UR family: three parallel axes (2 to 4) and two at right angles.
 
     Attributes:
-        name: As the manufacturer writes it.
         d: Shifts along z [m], of which the second and third are zero.
         a: Shifts along x [m], of which only the second and third are not zero.
         joint_limit: Greatest turn of each joint either way [rad].
         joint_speed: Greatest speed of each joint [rad/s].
     """
 
-    name: str
     d: tuple[float, float, float, float, float, float]
     a: tuple[float, float, float, float, float, float]
     joint_limit: float
@@ -52,14 +51,12 @@ class DhArm(NamedTuple):
 _SPEEDS = (2.0 / 3.0 * math.pi, 2.0 / 3.0 * math.pi, math.pi, math.pi, math.pi, math.pi)
 
 UR10 = DhArm(
-    name="UR10",
     d=(0.1273, 0.0, 0.0, 0.163941, 0.1157, 0.0922),
     a=(0.0, -0.612, -0.5723, 0.0, 0.0, 0.0),
     joint_limit=2.0 * math.pi,
     joint_speed=_SPEEDS,
 )
 UR10E = DhArm(
-    name="UR10e",
     d=(0.1807, 0.0, 0.0, 0.17415, 0.11985, 0.11655),
     a=(0.0, -0.6127, -0.57155, 0.0, 0.0, 0.0),
     joint_limit=2.0 * math.pi,
@@ -78,7 +75,7 @@ class JointPath(NamedTuple):
             joint exceeds its speed limit.
         at: Index of the first pose of which that is true; None if all is well.
         largest_step: Greatest change of a joint from one pose to the next [rad].
-        fastest: Greatest speed of a joint as a share of its limit; NaN without times.
+        fastest: Greatest speed of a joint as a share of its limit.
     """
 
     joints: np.ndarray
@@ -250,13 +247,7 @@ def _elbow(upper: float, fore: float, x: float, y: float) -> list[tuple[float, f
 
 
 def follow(
-    arm: DhArm,
-    poses: np.ndarray,
-    start: Numbers,
-    *,
-    times: np.ndarray | None = None,
-    tcp: Numbers | None = None,
-    largest_step: float = 0.3,
+    arm: DhArm, poses: np.ndarray, start: Numbers, *, times: np.ndarray, tcp: Numbers | None = None
 ) -> JointPath:
     """Joints along a whole path, each nearest to the one before, and whether the arm can go it.
 
@@ -267,23 +258,11 @@ def follow(
         arm: The Denavit-Hartenberg table.
         poses: TCP in the base frame, shape [T, 6].
         start: Joints from which the path begins [rad], shape [6]; its first step counts too.
-        times: Of the poses [s], shape [T], rising; joint speeds are checked where given.
+        times: Of the poses [s], shape [T], rising.
         tcp: As for `forward`.
-        largest_step: A joint that moves further between two poses counts as a jump [rad].
-
-    Raises:
-        ValueError: `poses` or `times` has another shape, or times do not rise.
     """
-    poses = np.asarray(poses, dtype=float)
-    if poses.ndim != 2 or poses.shape[1] != 6:
-        raise ValueError(f"poses must have shape [T, 6], got {poses.shape}")
-    spans = None if times is None else np.diff(np.asarray(times, dtype=float))
-    if spans is not None and (len(spans) + 1 != len(poses) or not (spans > 0).all()):
-        raise ValueError(f"times must be {len(poses)} rising numbers, one for each pose")
-
     joints = np.full(poses.shape, np.nan)
-    near = np.asarray(start, dtype=float)
-    reached = len(poses)
+    near, reached = np.asarray(start, dtype=float), len(poses)
     for k, pose in enumerate(poses):
         found = inverse(arm, pose, near, tcp=tcp)
         if found is None:
@@ -292,16 +271,13 @@ def follow(
         joints[k] = near = found
     done = joints[:reached]
     steps = np.abs(np.diff(np.vstack([np.asarray(start, dtype=float), done]), axis=0)).max(axis=1)
-    step = float(steps.max(initial=0.0))
-    share = np.zeros(0)
-    if spans is not None and reached > 1:
-        speeds = np.abs(np.diff(done, axis=0)) / spans[: reached - 1, None]
-        share = (speeds / arm.joint_speed).max(axis=1)
-    fastest = float("nan") if spans is None else float(share.max(initial=0.0))
+    speeds = np.abs(np.diff(done, axis=0)) / np.diff(times)[: max(reached - 1, 0), None]
+    share = (speeds / arm.joint_speed).max(axis=1)
+    numbers = float(steps.max(initial=0.0)), float(share.max(initial=0.0))
     if reached < len(poses):
-        return JointPath(joints, "unreachable", reached, step, fastest)
-    if step > largest_step:
-        return JointPath(joints, "jump", int(np.argmax(steps > largest_step)), step, fastest)
-    if fastest > 1.0:
-        return JointPath(joints, "too fast", int(np.argmax(share > 1.0)) + 1, step, fastest)
-    return JointPath(joints, "ok", None, step, fastest)
+        return JointPath(joints, "unreachable", reached, *numbers)
+    if (jumps := steps > LARGEST_STEP).any():
+        return JointPath(joints, "jump", int(np.argmax(jumps)), *numbers)
+    if (hurries := share > 1.0).any():
+        return JointPath(joints, "too fast", int(np.argmax(hurries)) + 1, *numbers)
+    return JointPath(joints, "ok", None, *numbers)

@@ -8,13 +8,7 @@ import numpy as np
 
 from ..rig import Rig
 from .cup_frame import cup_frame
-from .stir_paths import (
-    PosePath,
-    placed,
-    profile,
-    travel,
-    turn_rate,
-)
+from .stir_paths import PosePath, over, placed, profile, travel, turn_rate
 
 RAMP_SECONDS = 0.1  # s, in which the turn reaches its angular velocity, and in which it ends
 UPRIGHT_RATE = np.radians(60.0)  # rad/s, of the turn back
@@ -48,9 +42,7 @@ def approach_pour(rig: Rig, pose: np.ndarray, *, distance: float, lip_height: fl
         lip_height: Of the lip above the receiver's floor while it pours [m].
     """
     target = ready_to_pour(rig, distance, lip_height)
-    high = max(pose[2], target[2])
-    corners = [pose, placed(pose, z=high), placed(target, z=high), target]
-    return travel(rig, corners, rig.pouring.approach_speed)
+    return over(rig, pose, target, rig.pouring.approach_speed)
 
 
 def pour_path(

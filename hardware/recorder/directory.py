@@ -144,7 +144,7 @@ def read_provenance(directory: Path) -> Provenance:
     try:
         written = json.loads(path.read_text(encoding="utf-8"))
         return Provenance(
-            # without `checked_rig`: it stays readable whatever ends an arm's numbers have since
+            # without their check: it stays readable whatever ends an arm's numbers have since
             rig=Rig.model_validate(written["rig"]),
             hash=written["hash"],
             cameras={view: from_fields(written["cameras"][view]) for view in VIEWS},

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import missing_extra
-from .background_sync import BackgroundSync
-from .csv_file import write_all
+from .csv_file import BackgroundSync, write_all
 
 _TICK = Fraction(1, 1000)  # Matroska's own unit of time [s]
 _QUALITY = 2  # MJPEG's best: blocks of a coarser one move a line's edge

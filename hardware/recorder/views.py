@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import RigError
 from ..rig import Camera, Rig, View
 from ..vision.camera_model import CameraModel, CameraModelError, look_at, read_camera
-from ..vision.stick_view import StickView
+from ..vision.stick_view import Scene, StickView
 
 
 def camera_model(camera: Camera) -> CameraModel:
@@ -74,14 +74,20 @@ def stick_view(rig: Rig, view: View, camera: CameraModel | None = None) -> Stick
     Raises:
         RigError: See `camera_model`.
     """
-    return StickView(
-        camera=camera or camera_model(rig.camera(view)),
+    # the wall of the cup bends what is seen through it
+    model = camera or camera_model(rig.camera(view))
+    return StickView(scene(rig, view), model, rig.cup.height, rig.stick.colour)
+
+
+def scene(rig: Rig, view: View) -> Scene:
+    """What a rig's camera looks at."""
+    camera = rig.camera(view)
+    return Scene(
+        marker_offset=camera.marker,
+        cup_radius=rig.cup.radius,
+        cup_height=rig.cup.height,
+        fill=rig.cup.fill,
         stick_radius=rig.stick.radius,
         stick_length=rig.stick.length,
-        marker_offset=rig.camera(view).marker,
-        marker_radius=rig.camera(view).marker_radius,
-        # the wall of the cup bends what is seen through it
-        surface_height=rig.cup.height,
-        cup_radius=rig.cup.radius,
-        contrast=rig.stick.colour,
+        marker_radius=camera.marker_radius,
     )

@@ -1,9 +1,9 @@
 """Synthetic pictures of the stirring scene, for rehearsals and as the truth of tests."""
 
+from ..vision.stick_view import Scene
 from .drawing import Stage, exposure_times, prepare, render
-from .scene import BRIGHT_STICK, Look, Scene
-from .shared_world import SharedWorld
-from .world import World, WorldState, direction
+from .look import BRIGHT_STICK, Look
+from .world import SharedWorld, World, WorldState, direction
 
 __all__ = [
     "BRIGHT_STICK",

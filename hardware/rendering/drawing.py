@@ -7,9 +7,10 @@ import numpy as np
 
 from ..vision.camera_model import CameraModel
 from ..vision.opencv import opencv
+from ..vision.stick_view import Scene, circle
 from .coverage import bar_coverage, blend, disc_coverage, window_around
+from .look import Look
 from .noise import PixelNoise, noise_pool
-from .scene import Look, Scene, circle
 from .stick_shape import bar_sides, surface_share
 from .world import WorldState
 

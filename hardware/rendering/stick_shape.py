@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..vision.camera_model import CameraModel
-from .scene import Scene
+from ..vision.stick_view import Scene
 from .world import WorldState, direction
 
 

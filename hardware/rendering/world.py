@@ -1,8 +1,19 @@
-"""What the rendered cameras look at: where the gripper is and how the stick hangs."""
+"""What the rendered cameras look at: where the gripper is and how the stick hangs.
 
-from typing import NamedTuple, Protocol
+In shared memory one process moves it, and cameras in other processes look at it. As on the board, a
+number is one aligned double and nobody waits: whoever looks leaves out the rows that may be in the
+making.
+"""
+
+from ctypes import c_double, c_longlong
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+
+from ..board import SPAWN
+
+ROWS = 1024  # 2 s at the fastest controller's 500 Hz
+WIDTH = 7  # host time, robot's time, pivot, inclination
 
 
 class WorldState(NamedTuple):
@@ -31,3 +42,36 @@ def direction(inclination: np.ndarray) -> np.ndarray:
     """Unit vector from the pivot down the stick, from its two inclinations [rad]; shape (3,)."""
     x, y = np.tan(inclination)
     return np.array([x, y, -1.0]) / np.sqrt(1.0 + x * x + y * y)
+
+
+class SharedWorld:
+    """The latest states; it may be given to spawned processes as an argument.
+
+    Args:
+        host: Host time [s] of its first state.
+        state: How it is until somebody moves it.
+    """
+
+    def __init__(self, host: float, state: WorldState):
+        self._memory: Any = SPAWN.RawArray(c_double, ROWS * WIDTH)
+        self._written: Any = SPAWN.RawValue(c_longlong, 0)
+        self.write(host, state)
+
+    def write(self, host: float, state: WorldState) -> None:
+        """Add a state at a later host time [s]; for the process alone that moves the world."""
+        at = WIDTH * (self._written.value % ROWS)
+        self._memory[at : at + WIDTH] = [host, state.time, *state.pivot, *state.inclination]
+        # the count goes last: a row that it counts is whole
+        self._written.value += 1
+
+    def state(self, host: float) -> WorldState:
+        """The scene at a host time [s], between the two states around it; the last one stays."""
+        while True:
+            end = self._written.value
+            rows = np.frombuffer(self._memory).reshape(ROWS, WIDTH).copy()
+            first = max(self._written.value - ROWS + 1, 0)
+            if first < end:  # always, unless this process stood still for seconds in between
+                break
+        times, *columns = rows[np.arange(first, end) % ROWS].T
+        time, *place = (float(np.interp(host, times, column)) for column in columns)
+        return WorldState(time, np.array(place[:3]), np.array(place[3:]))

@@ -172,7 +172,8 @@ class ControlLoop:
             if left > 0:
                 self._clock.sleep(left)
             late = max(self._clock.now() - deadline, 0.0)
-            self._await_package(deadline + MOST_WAIT * self._period)
+            # one that is late would be missed when the next one comes in time
+            self._await_package(deadline + MOST_WAIT * self._period, self._watch.time)
             age = self._tick(late)
             # whole periods that were missed are left out: the path is delayed, never hurried
             missed = self._period * int(late / self._period)
@@ -180,16 +181,14 @@ class ControlLoop:
             if self._trip is None and deadline - self._clock.now() > CHECK_ROOM * self._period:
                 self._vet()
 
-    def _await_package(self, end: float) -> None:
-        """Wait for one that is late: it would be missed when the next one comes in time."""
-        while self._clock.now() < end and self._reader.time() == self._watch.time:
+    def _await_package(self, end: float, latest: float) -> None:
+        """Wait for one that is newer than the latest, at most to the end."""
+        while self._clock.now() < end and self._reader.time() == latest:
             self._clock.sleep(0.05 * self._period)
 
     def _between_packages(self) -> float:
         """Half a period after the next package comes; one period from now if none does."""
-        latest, end = self._reader.time(), self._clock.now() + self._period
-        while self._clock.now() < end and self._reader.time() == latest:
-            self._clock.sleep(0.05 * self._period)
+        self._await_package(self._clock.now() + self._period, self._reader.time())
         return self._clock.now() + 0.5 * self._period
 
     def _at_rest(self) -> bool:

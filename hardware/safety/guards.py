@@ -49,7 +49,7 @@ GUARD_MESSAGES = {
     "camera yz": "no new picture for",
     "recorder": "no sign of life for",
 }
-CAMERAS = {Who.CAMERA_XZ: "camera xz", Who.CAMERA_YZ: "camera yz"}
+CAMERAS = (Who.CAMERA_XZ, Who.CAMERA_YZ)
 
 
 class GuardState(NamedTuple):
@@ -185,10 +185,8 @@ def _others(seen: Seen, rules: Rules) -> tuple[Reading, ...]:
     readings = []
     for who, row in seen.rows.items():
         if who in CAMERAS:
-            readings.append(
-                Reading(f"{CAMERAS[who]} health", float(row.trouble > 0), YES_LIMIT, "")
-            )
-            readings.append(Reading(CAMERAS[who], row.age(seen.now), rules.limits.frame_age, "s"))
+            readings.append(Reading(f"{who.label} health", float(row.trouble > 0), YES_LIMIT, ""))
+            readings.append(Reading(who.label, row.age(seen.now), rules.limits.frame_age, "s"))
     row = seen.rows[Who.RECORDER]
     return (
         Reading("recorder health", float(row.trouble > 0), YES_LIMIT, ""),
@@ -226,8 +224,7 @@ def _outside(position: tuple[float, float, float], box: AxisLimits) -> float:
 
 def _reason(reading: Reading, seen: Seen) -> str:
     state, words = seen.state, reading.name.removesuffix(" health")
-    rows = {name: seen.rows[who] for who, name in CAMERAS.items() if who in seen.rows}
-    rows["recorder"] = seen.rows[Who.RECORDER]
+    rows = {who.label: row for who, row in seen.rows.items()}
     if reading.name.endswith(" health"):
         return f"{words} {OUTCOME_TROUBLE[Trouble(int(rows[words].trouble))]}"
     special = {

@@ -127,11 +127,10 @@ def process_checks(rows: Mapping[Who, Row], rig: Rig, now: float) -> list[Check]
     """Whether the other processes are alive and well."""
     checks = []
     for who, row in rows.items():
-        name = CAMERAS.get(who, "recorder")
         most = rig.limits.frame_age if who in CAMERAS else RECORDER_AGE
         well = row.age(now) <= most and not row.trouble
         text = f"last sign of life {row.age(now):.3f} s ago" if row.beat else NO_SIGN
-        checks.append(Check(name, well, text))
+        checks.append(Check(who.label, well, text))
     return checks
 
 

@@ -89,27 +89,25 @@ class _Tally(NamedTuple):
     """What is remembered of the pictures so far."""
 
     rate: Rate
+    row: Row = Row()  # as it goes to the board; its beat is when the last new picture came
     last: int = -1  # index of the last picture
     lost: int = 0
     same: int = 1  # times that the last picture has come in a row
-    beat: float = 0.0  # when the last new one came
-    worst: float = 0.0  # longest time between new ones
-    angle: float = float("nan")
 
 
-def tallied(tally: _Tally, row: FrameMeasurement, now: float) -> _Tally:
+def tallied(tally: _Tally, seen: FrameMeasurement, now: float) -> _Tally:
     """What is remembered after another picture, which came at `now` [s]."""
-    new = not row.flags & Flag.REPEATED_IMAGE
-    between = now - tally.beat if new and tally.beat else 0.0
-    return tally._replace(
-        rate=counted(tally.rate, 1, now),
-        last=row.index,
-        lost=tally.lost + max(row.index - tally.last - 1, 0),
-        same=1 if new else tally.same + 1,
-        beat=now if new else tally.beat,
-        worst=max(tally.worst, between),
-        angle=row.angle if line_is_good(row.flags) else float("nan"),
+    before, rate = tally.row, counted(tally.rate, 1, now)
+    row = before._replace(
+        count=rate.total,
+        rate=rate.rate,
+        value=seen.angle if line_is_good(seen.flags) else float("nan"),
     )
+    same = tally.same + 1
+    if not seen.flags & Flag.REPEATED_IMAGE:
+        between = now - before.beat if before.beat else 0.0
+        row, same = row._replace(beat=now, worst=max(before.worst, between)), 1
+    return _Tally(rate, row, seen.index, tally.lost + max(seen.index - tally.last - 1, 0), same)
 
 
 class _CameraProcess:
@@ -193,15 +191,5 @@ class _CameraProcess:
         self._disk.tell(trouble.kind, **fields)
 
     def _beat(self) -> None:
-        tally = self._tally
-        self._board.write(
-            WHO[self._view],
-            Row(
-                beat=tally.beat,
-                trouble=self._disk.trouble or self._trouble,
-                count=tally.rate.total,
-                rate=tally.rate.rate,
-                value=tally.angle,
-                worst=tally.worst,
-            ),
-        )
+        row = self._tally.row._replace(trouble=self._disk.trouble or self._trouble)
+        self._board.write(WHO[self._view], row)

@@ -14,12 +14,6 @@ from .progress import Status
 BAR_WIDTH = 30
 LITTLE_MARGIN = 0.2  # of a guard's limit: less margin is shown in yellow
 FRESH_SECONDS = 0.5  # [s]; an older sign of life is shown in red
-NAMES = {
-    Who.CONTROL: "robot",
-    Who.RECORDER: "recorder",
-    Who.CAMERA_XZ: "camera xz",
-    Who.CAMERA_YZ: "camera yz",
-}
 COUNTED_UNITS = {Who.CONTROL: "ticks", Who.RECORDER: "rows"}
 
 
@@ -37,7 +31,8 @@ def live_table(title: str, status: Status, now: float) -> Table:
     table.add_row("stick", _inclination(status.rows))
     table.add_row("loop", f"at most {1e3 * status.rows[Who.CONTROL].worst:.1f} ms late")
     for who in Who:
-        table.add_row(NAMES[who], _alive(who, status.rows[who], now))
+        name = "robot" if who is Who.CONTROL else who.label
+        table.add_row(name, _alive(who, status.rows[who], now))
     for guard in filter(lambda one: one.unit, status.readings):  # the others are yes or no
         table.add_row(guard.name, _guard(guard))
     if status.stopped is not None:

@@ -11,6 +11,14 @@ import numpy as np
 from .opencv import opencv
 
 UNDISTORT_UNTIL = 20, 1e-9  # iterations, or an error of the picture [px]
+SHAPES = {
+    "focal": (2,),
+    "centre": (2,),
+    "size": (2,),
+    "rotation": (3, 3),
+    "position": (3,),
+    "distortion": (5,),
+}
 
 
 class CameraModelError(ValueError):
@@ -44,14 +52,7 @@ class CameraModel:
     distortion: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        for name, shape in (
-            ("focal", (2,)),
-            ("centre", (2,)),
-            ("size", (2,)),
-            ("rotation", (3, 3)),
-            ("position", (3,)),
-            ("distortion", (5,)),
-        ):
+        for name, shape in SHAPES.items():
             value = np.array(getattr(self, name), dtype=float)
             if value.shape != shape or not np.isfinite(value).all():
                 raise CameraModelError(
@@ -147,14 +148,7 @@ def look_at(position: np.ndarray, target: np.ndarray, roll: float = 0.0) -> np.n
 
 def as_fields(camera: CameraModel) -> dict[str, Any]:
     """A camera as JSON can hold it."""
-    return {
-        "focal": list(camera.focal),
-        "centre": list(camera.centre),
-        "size": list(camera.size),
-        "rotation": camera.rotation.tolist(),
-        "position": camera.position.tolist(),
-        "distortion": list(camera.distortion),
-    }
+    return {name: np.asarray(getattr(camera, name)).tolist() for name in SHAPES}
 
 
 def from_fields(fields: Mapping[str, Any]) -> CameraModel:
@@ -163,14 +157,8 @@ def from_fields(fields: Mapping[str, Any]) -> CameraModel:
     Raises:
         KeyError, TypeError, ValueError: They describe no camera.
     """
-    return CameraModel(
-        focal=tuple(fields["focal"]),
-        centre=tuple(fields["centre"]),
-        size=tuple(fields["size"]),
-        rotation=np.array(fields["rotation"], dtype=float),
-        position=np.array(fields["position"], dtype=float),
-        distortion=tuple(fields["distortion"]),
-    )
+    values: dict[str, Any] = {name: tuple(fields[name]) for name in SHAPES}
+    return CameraModel(**values)
 
 
 def write_camera(camera: CameraModel, path: Path) -> None:

@@ -92,8 +92,10 @@ def join(xz: MeasuredView, yz: MeasuredView, times: np.ndarray) -> Inclination:
         yz: The camera that looks along -x.
         times: Wanted times of the robot's clock [s], shape (T,).
     """
-    seen = (interpolate_lines(one.series, np.asarray(times) + one.delay) for one in (xz, yz))
-    return inclination(*seen, xz.camera, yz.camera)
+    seen_xz, seen_yz = (
+        interpolate_lines(one.series, np.asarray(times) + one.delay) for one in (xz, yz)
+    )
+    return inclination(seen_xz, seen_yz, xz.camera, yz.camera)
 
 
 def direction(

@@ -9,7 +9,7 @@ from .frame import Frame
 from .frame_measurement import Flag, FrameMeasurement, line_is_good
 from .marker import Marker, find_marker
 from .stick_edges import Edges, find_edges
-from .stick_line import Line, fit_line, moment_slope
+from .stick_line import NO_LINE, Line, fit_line, moment_slope
 from .stick_view import StickView
 
 LEAST_RESPONSE = 12.0  # grey levels
@@ -48,9 +48,9 @@ class Track(NamedTuple):
 class _Stick(NamedTuple):
     """The stick in one picture, before it is compared with other pictures."""
 
-    line: Line | None
-    second_angle: float
-    flags: Flag
+    line: Line = NO_LINE
+    second_angle: float = float("nan")
+    flags: Flag = Flag.NOT_FOUND
 
 
 def measure(frame: Frame, view: StickView, track: Track) -> tuple[FrameMeasurement, Track]:
@@ -73,13 +73,13 @@ def measure(frame: Frame, view: StickView, track: Track) -> tuple[FrameMeasureme
             f"frame {frame.index} is {image.dtype} of shape {image.shape}; the camera model is "
             f"for grey uint8 of shape {view.camera.size[::-1]}: calibrate at the size you record"
         )
-    marker = find_marker(image, view.marker_radius * view.scale)
+    marker = find_marker(image, view.scene.marker_radius * view.scale)
     pivot = _pivot(marker, view) if marker is not None else track.pivot
     stick = _find_stick(image, view, pivot, known=marker is not None)
     flags = stick.flags | (Flag(0) if marker is not None else Flag.NO_MARKER)
     if track.image is not None and np.array_equal(image, track.image):
         flags |= Flag.REPEATED_IMAGE
-    angle = float(np.arctan(stick.line.slope)) if stick.line is not None else float("nan")
+    angle = float(np.arctan(stick.line.slope))
     if _jumps(angle, frame.stamp, track):
         flags |= Flag.JUMP
     measurement = _as_measurement(frame, marker, stick, flags)
@@ -108,43 +108,42 @@ class FrameMeter:
 def _pivot(marker: Marker, view: StickView) -> tuple[float, float]:
     """Where the pivot is in the picture; its depth is taken as that above the cup's middle."""
     place = view.camera.place(np.array([marker.column, marker.row]), view.marker_depth)
-    column, row = view.camera.project(place - np.array(view.marker_offset))
+    column, row = view.camera.project(place - np.array(view.scene.marker_offset))
     return float(column), float(row)
 
 
 def _find_stick(
     image: np.ndarray, view: StickView, pivot: tuple[float, float] | None, *, known: bool
 ) -> _Stick:
-    nothing = _Stick(None, float("nan"), Flag.NOT_FOUND)
     if pivot is None:
-        return nothing
+        return _Stick()
     rows = _rows(pivot, view)
     if rows.last - rows.first < LEAST_ROWS:
-        return nothing
+        return _Stick()
     sign = -1.0 if view.contrast == "dark" else 1.0
-    width, length = 2.0 * view.stick_radius * view.scale, view.stick_length * view.scale
+    width, length = 2.0 * view.scene.stick_radius * view.scale, view.scene.stick_length * view.scale
     reach, step = (3.0, 1.5) if known else (HIDDEN_SEARCH, 4.0)
     columns = pivot[0] + np.arange(-reach, reach + 0.1, step)
     lines = sampled_rows(image, sign, rows)
     ray = search_rays(lines, columns, pivot[1], rows, width=width, length=length)
     if ray.response < LEAST_RESPONSE:
-        return nothing
+        return _Stick()
     reached = min(rows.last, int(pivot[1] + 0.97 * length / np.hypot(1.0, ray.slope)))
     rows = Rows(rows.first, reached)
     if rows.last - rows.first < LEAST_ROWS:
-        return nothing
+        return _Stick()
     edges = find_edges(image, sign, ray, rows, width)
     stick = _line_of(edges, ray, width, view)
     if ray.rival > RIVAL_SHARE * ray.response:
         stick = stick._replace(flags=stick.flags | Flag.AMBIGUOUS)
-    if stick.line is not None and known and _misses(stick.line, pivot, view):
+    if known and _misses(stick.line, pivot, view):
         return stick._replace(flags=stick.flags | Flag.OFF_PIVOT)
     return stick
 
 
 def _rows(pivot: tuple[float, float], view: StickView) -> Rows:
     """From below the gripper to above the liquid's surface."""
-    hidden = view.gripper_below * 1.3 * view.scale + 4.0
+    hidden = view.scene.gripper_below * 1.3 * view.scale + 4.0
     first = max(int(np.ceil(pivot[1] + hidden)), 0)
     return Rows(first, min(int(view.last_row), view.camera.size[1]))
 
@@ -156,7 +155,7 @@ def _line_of(edges: Edges, ray: Ray, width: float, view: StickView) -> _Stick:
     clear = edges.contrast > 0.5 * max(float(np.median(edges.contrast)), LEAST_RESPONSE)
     clear &= np.isfinite(found)
     if clear.sum() < LEAST_ROWS // 2:
-        return _Stick(None, float("nan"), Flag.NOT_FOUND)
+        return _Stick()
     usual = _usual_width(edges.row, found, clear)
     flags = Flag(0)
     if abs(float(np.median(usual)) - width * stretch) > WIDTH_TOLERANCE * width * stretch:
@@ -165,10 +164,9 @@ def _line_of(edges: Edges, ray: Ray, width: float, view: StickView) -> _Stick:
     middle = np.column_stack([0.5 * (edges.left + edges.right), edges.row])[kept]
     line = fit_line(view.camera.undistort(middle))
     second = _second_angle(edges, clear, view)
-    if line is not None:
-        line = _with_systematic(line, middle, view)
-    if line is None:
-        return _Stick(None, second, flags | Flag.NOT_FOUND)
+    if line is NO_LINE:
+        return _Stick(line, second, flags | Flag.NOT_FOUND)
+    line = _with_systematic(line, middle, view)
     if np.sum(line.inlier) < max(LEAST_ROWS, LEAST_ROWS_SHARE * len(edges.row)):
         flags |= Flag.FEW_ROWS
     if not abs(np.arctan(line.slope) - second) < MOST_DISAGREEMENT + 4.0 * line.slope_error:
@@ -191,7 +189,7 @@ def _with_systematic(line: Line, middle: np.ndarray, view: StickView) -> Line:
 def _usual_width(row: np.ndarray, found: np.ndarray, clear: np.ndarray) -> np.ndarray:
     """Width of the stick in every row [px]: it grows evenly as the stick comes nearer."""
     line = fit_line(np.column_stack([found, row])[clear])
-    if line is None:
+    if line is NO_LINE:
         return np.full(len(row), float(np.median(found[clear])))
     return line.offset + line.slope * row
 
@@ -222,17 +220,16 @@ def _as_measurement(
     frame: Frame, marker: Marker | None, stick: _Stick, flags: Flag
 ) -> FrameMeasurement:
     nan, line = float("nan"), stick.line
-    slope = line.slope if line is not None else nan
     return FrameMeasurement(
         index=frame.index,
         stamp=frame.stamp,
         marker_column=marker.column if marker is not None else nan,
         marker_row=marker.row if marker is not None else nan,
-        angle=float(np.arctan(slope)),
-        offset=line.offset if line is not None else nan,
-        angle_error=line.slope_error / (1.0 + slope**2) if line is not None else nan,
-        offset_error=line.offset_error if line is not None else nan,
+        angle=float(np.arctan(line.slope)),
+        offset=line.offset,
+        angle_error=line.slope_error / (1.0 + line.slope**2),
+        offset_error=line.offset_error,
         second_angle=stick.second_angle,
-        rows=int(line.inlier.sum()) if line is not None else 0,
+        rows=int(line.inlier.sum()),
         flags=int(flags),
     )

@@ -95,9 +95,9 @@ def _thread(image: np.ndarray, camera: CameraModel, width: float) -> Line:
             "the whole picture"
         )
     points = _centroids(image, ray, width)
-    line = fit_line(camera.undistort(points)) if len(points) else None
-    count = 0 if line is None else int(line.inlier.sum())
-    if line is None or count < LEAST_SHARE * image.shape[0] or line.slope_error > MOST_ERROR:
+    line = fit_line(camera.undistort(points))
+    count = int(line.inlier.sum())
+    if count < LEAST_SHARE * image.shape[0] or line.slope_error > MOST_ERROR:
         raise PlumbLineError(
             f"the plumb line is seen in {count} of {image.shape[0]} rows; it must be straight and "
             "free over at least half of them"

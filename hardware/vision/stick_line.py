@@ -28,7 +28,10 @@ class Line(NamedTuple):
     inlier: np.ndarray
 
 
-def fit_line(points: np.ndarray) -> Line | None:
+NO_LINE = Line(*4 * (float("nan"),), inlier=np.zeros(0, bool))
+
+
+def fit_line(points: np.ndarray) -> Line:
     """Straight line x(y) by Huber's M-estimate, started at the median of many pairs' slopes.
 
     The standard error takes the residuals' correlation from row to row into account.
@@ -38,10 +41,10 @@ def fit_line(points: np.ndarray) -> Line | None:
             of their rows.
 
     Returns:
-        The line, or None when there are fewer than 8 points.
+        The line; `NO_LINE` when there are fewer than 8 points.
     """
     if len(points) < 8:
-        return None
+        return NO_LINE
     x, y = points[:, 0], points[:, 1]
     middle = y.mean()
     y = y - middle

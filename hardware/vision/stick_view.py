@@ -11,39 +11,65 @@ from .camera_model import CameraModel, CameraModelError
 SURFACE_MARGIN = 0.003  # the liquid climbs the stick, and waves
 
 
-@dataclass(frozen=True, eq=False)
-class StickView:
-    """One camera's view of the stick; lengths in m, places in the cup frame.
+@dataclass(frozen=True)
+class Scene:
+    """What one camera looks at: sizes [m]; the cup's floor is at the origin of the cup frame.
 
     Attributes:
-        camera: That looks.
+        cup_radius: Of the liquid's surface and, as drawn, of the glass.
+        cup_height: Rim above the floor.
+        fill: Depth of the liquid; 0 for an empty cup.
         stick_radius: Of the stick.
         stick_length: From the pivot to the tip.
-        marker_offset: From the pivot to the centre of this camera's marker on the gripper.
-        marker_radius: Of the round, bright marker on the dark gripper.
-        surface_height: Of the liquid; give the rim's height instead when the cup is not clear.
-        cup_radius: Of the surface.
-        gripper_below: The gripper hides this length of the stick below the pivot.
+        marker_offset: From the pivot to the marker's centre as this camera sees it; each camera
+            has a marker of its own, on the face of the gripper that it looks at.
+        marker_radius: Of the round marker.
+        gripper_half_width: In x and in y.
+        gripper_below: How far the gripper hangs below the pivot.
+        gripper_above: How far it reaches above.
+    """
+
+    marker_offset: tuple[float, float, float]
+    cup_radius: float = 0.04
+    cup_height: float = 0.075
+    fill: float = 0.05
+    stick_radius: float = 0.0045
+    stick_length: float = 0.22
+    marker_radius: float = 0.006
+    gripper_half_width: float = 0.02
+    gripper_below: float = 0.01
+    gripper_above: float = 0.04
+
+
+def circle(radius: float, height: float, points: int = 72) -> np.ndarray:
+    """Points [m] of a horizontal circle about the cup's axis, shape (points, 3)."""
+    angle = 2.0 * np.pi * np.arange(points) / points
+    return np.column_stack(
+        [radius * np.cos(angle), radius * np.sin(angle), np.full(points, height)]
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class StickView:
+    """One camera's view of the stick.
+
+    Attributes:
+        scene: That it looks at.
+        camera: That looks.
+        surface_height: Of the liquid [m]; give the rim's height instead when the cup is not clear.
         contrast: Whether the stick is darker or brighter than what is behind it.
     """
 
+    scene: Scene
     camera: CameraModel
-    stick_radius: float
-    stick_length: float
-    marker_offset: tuple[float, float, float]
-    marker_radius: float
     surface_height: float
-    cup_radius: float
-    gripper_below: float = 0.01
     contrast: Literal["dark", "bright"] = "dark"
 
     @cached_property
     def last_row(self) -> float:
         """Row [px] above which everything is seen above the surface, wherever the stick is."""
-        angle = 2.0 * np.pi * np.arange(48) / 48
-        rim = self.cup_radius * np.column_stack([np.cos(angle), np.sin(angle)])
-        height = np.full((48, 1), self.surface_height + SURFACE_MARGIN)
-        rows = self.camera.project(np.hstack([rim, height]))[:, 1]
+        surface = circle(self.scene.cup_radius, self.surface_height + SURFACE_MARGIN, 48)
+        rows = self.camera.project(surface)[:, 1]
         if not np.isfinite(rows).all():
             raise CameraModelError(
                 f"the surface at {self.surface_height} m is behind the camera at "
@@ -54,8 +80,8 @@ class StickView:
     @cached_property
     def marker_depth(self) -> float:
         """Depth of the marker [m] while the pivot is above the cup's middle."""
-        x, y, _ = self.marker_offset
-        return self.camera.depth(np.array([x, y, self.surface_height + self.stick_length]))
+        x, y, _ = self.scene.marker_offset
+        return self.camera.depth(np.array([x, y, self.surface_height + self.scene.stick_length]))
 
     @cached_property
     def scale(self) -> float:

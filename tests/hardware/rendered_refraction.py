@@ -10,10 +10,10 @@ from bolfi_liquids.hardware.rendering.drawing import (
     draw,
     fixed_point,
 )
-from bolfi_liquids.hardware.rendering.scene import Scene, circle
 from bolfi_liquids.hardware.rendering.stick_shape import surface_share
 from bolfi_liquids.hardware.rendering.world import WorldState, direction
 from bolfi_liquids.hardware.vision.camera_model import CameraModel
+from bolfi_liquids.hardware.vision.stick_view import Scene, circle
 
 REFRACTIVE_INDEX = 1.33
 

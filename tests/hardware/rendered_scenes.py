@@ -54,17 +54,7 @@ def rehearsal_scene(view: ViewName) -> Scene:
 def stick_view(scene: Scene, camera: CameraModel, look: Look | None = None) -> StickView:
     """What a camera knows before its first frame when it looks at a rendered scene."""
     bright = look is not None and look.stick > look.background
-    return StickView(
-        camera=camera,
-        stick_radius=scene.stick_radius,
-        stick_length=scene.stick_length,
-        marker_offset=scene.marker_offset,
-        marker_radius=scene.marker_radius,
-        surface_height=scene.fill,
-        cup_radius=scene.cup_radius,
-        gripper_below=scene.gripper_below,
-        contrast="bright" if bright else "dark",
-    )
+    return StickView(scene, camera, scene.fill, "bright" if bright else "dark")
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from bolfi_liquids.hardware.rendering import (
     prepare,
     render,
 )
-from bolfi_liquids.hardware.rendering.shared_world import ROWS, SharedWorld
+from bolfi_liquids.hardware.rendering.world import ROWS, SharedWorld
 from rendered_faults import fault_of, render_with
 from rendered_refraction import refracted
 from rendered_scenes import CLEAN, rehearsal_camera, rehearsal_scene

@@ -8,8 +8,8 @@ from bolfi_liquids.hardware.errors import RigError
 from bolfi_liquids.hardware.rig import Rig
 from bolfi_liquids.hardware.rig_checks import receiver_fault
 from bolfi_liquids.hardware.rig_file import bundled_rig, checked_rig, open_rig
-from bolfi_liquids.hardware.rig_numbers import numbers
 from pydantic import ValidationError
+from rig_ends import numbers
 
 TEXT = (files("bolfi_liquids.hardware.data") / "rig.toml").read_text(encoding="utf-8")
 

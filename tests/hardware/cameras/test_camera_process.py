@@ -20,8 +20,8 @@ from bolfi_liquids.hardware.recorder.events import read_events  # noqa: E402
 from bolfi_liquids.hardware.recorder.rate import no_rate  # noqa: E402
 from bolfi_liquids.hardware.recorder.video import VideoWriter  # noqa: E402
 from bolfi_liquids.hardware.recorder.views import camera_model, stick_view  # noqa: E402
+from bolfi_liquids.hardware.rendering import Look, Scene  # noqa: E402
 from bolfi_liquids.hardware.rendering.drawing import prepare, render  # noqa: E402
-from bolfi_liquids.hardware.rendering.scene import Look, Scene  # noqa: E402
 from bolfi_liquids.hardware.rendering.world import WorldState  # noqa: E402
 from bolfi_liquids.hardware.rig_file import bundled_rig  # noqa: E402
 from bolfi_liquids.hardware.session.camera_process import _Tally as Tally  # noqa: E402
@@ -354,8 +354,8 @@ def test_lost_and_repeated_pictures_are_counted():
         image = np.full((480, 640), min(k, 3), np.uint8)
         tally = tallied(tally, meter.measure(Frame(index, k / 30, image)), 1.0 + k / 30)
     assert (tally.rate.total, tally.lost, tally.same) == (6, 5, 3)
-    assert tally.beat == pytest.approx(1.1)
-    assert tally.worst == pytest.approx(1 / 30)
+    assert tally.row.beat == pytest.approx(1.1)
+    assert tally.row.worst == pytest.approx(1 / 30)
 
 
 @pytest.mark.minutes

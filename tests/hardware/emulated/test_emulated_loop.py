@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware import Session, SessionSetup, SessionStopped, bundled_rig, emulated
+from bolfi_liquids.hardware import Session, SessionSetup, SessionStopped, emulated
 from bolfi_liquids.hardware.emulated.rig import patient
 from bolfi_liquids.hardware.motion.pour_paths import pour_path, ready_to_pour
 from bolfi_liquids.hardware.motion.stir_paths import retract, stir
@@ -23,11 +23,10 @@ from bolfi_liquids.hardware.robot.orders import (
     Stopped,
 )
 from bolfi_liquids.hardware.safety.preflight import failures
+from short_rig import short_rig
 from stepped_clock import SteppedClock
 
-RIG = bundled_rig()
-SHORT = {"rest": 0.1, "points": 5, "radius": 0.02}
-RIG = RIG.model_copy(update={"stirring": RIG.stirring.model_copy(update=SHORT)})
+RIG = short_rig()
 PATH = stir(RIG)
 PERIOD = 1.0 / RIG.robot.rate
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from bolfi_liquids.hardware import bundled_rig
+from bolfi_liquids.hardware.emulated.motion import servoed
 from bolfi_liquids.hardware.emulated.replayed_stick import (
     FADE,
     NEAR,
@@ -10,7 +11,6 @@ from bolfi_liquids.hardware.emulated.replayed_stick import (
     angles,
     init,
 )
-from bolfi_liquids.hardware.emulated.servoed_path import servoed
 from bolfi_liquids.hardware.emulated.stick_motion import StickMotion, checked
 from bolfi_liquids.hardware.motion import PosePath, joined, star, strokes
 

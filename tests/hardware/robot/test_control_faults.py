@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.board import Trouble, Who
 from bolfi_liquids.hardware.motion.stir_paths import stir
-from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.robot.orders import Began, Checked, Done, Follow, Leave, Stop
+from short_rig import short_rig
 from ur_controller.patience import patient
 
-RIG = bundled_rig()
-SHORT = {"rest": 0.1, "points": 5, "radius": 0.02}
-RIG = RIG.model_copy(update={"stirring": RIG.stirring.model_copy(update=SHORT)})
+RIG = short_rig()
 PATH = stir(RIG)
 
 

@@ -36,12 +36,12 @@ from bolfi_liquids.hardware.safety.guards import Trip
 from bolfi_liquids.hardware.safety.limits import workspace
 from bolfi_liquids.hardware.safety.preflight import failures
 from scipy.spatial.transform import Rotation
+from short_rig import short_rig
 from ur_controller.patience import patient
 from ur_controller.process import ControllerProcess
 
 RIG = patient(bundled_rig())
-SHORT = {"rest": 0.1, "points": 5, "radius": 0.02}
-QUICK = RIG.model_copy(update={"stirring": RIG.stirring.model_copy(update=SHORT)})
+QUICK = patient(short_rig())
 PERIOD = 1.0 / RIG.robot.rate
 FRAME = cup_frame(RIG.cup)
 

@@ -13,7 +13,6 @@ from bolfi_liquids.hardware.errors import MotionRejected, RigError
 from bolfi_liquids.hardware.motion.stir_paths import insert, retract, stir
 from bolfi_liquids.hardware.recorder.events import read_events
 from bolfi_liquids.hardware.recorder.sample import SAMPLES
-from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.robot.ur import URController
 from bolfi_liquids.hardware.safety.preflight import failures
 from bolfi_liquids.hardware.session.confirmation import (
@@ -24,15 +23,14 @@ from bolfi_liquids.hardware.session.confirmation import (
 )
 from bolfi_liquids.hardware.session.session import Session, SessionStopped
 from bolfi_liquids.hardware.session.setup import SessionSetup
+from short_rig import short_rig
 from ur_controller.patience import PatientSetup
 from ur_controller.process import FOLDER, ControllerProcess
 
 # an arm that moves, and the watchdog of its controller; the others keep no time
 keeps_time = pytest.mark.punctual
 
-RIG = bundled_rig()
-SHORT = {"rest": 0.1, "points": 5, "radius": 0.02, "approach_speed": 0.1}
-RIG = RIG.model_copy(update={"stirring": RIG.stirring.model_copy(update=SHORT)})
+RIG = short_rig(approach_speed=0.1)
 PLAN = [stir(RIG), retract(RIG)]
 
 
@@ -235,6 +233,7 @@ from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.robot.ur import URController
 from bolfi_liquids.hardware.session.confirmation import CONFIRMATION, confirm
 from bolfi_liquids.hardware.session.session import Session
+from short_rig import short_rig
 from ur_controller.patience import PatientSetup
 
 if __name__ == "__main__":

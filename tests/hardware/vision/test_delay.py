@@ -168,10 +168,3 @@ def check_joined(joined, times, late) -> None:
 @pytest.mark.slow
 def test_a_stir_is_recovered_from_its_pictures():
     check_joined(*joined_from_pictures(200))
-
-
-@pytest.mark.parametrize("name", ["stick_radius", "marker_offset"])
-def test_scene_and_view_agree(name):
-    scene, camera = rehearsal_scene("xz"), rehearsal_camera("xz")
-    assert getattr(stick_view(scene, camera), name) == getattr(scene, name)
-    assert dataclasses.asdict(scene)[name] == getattr(scene, name)

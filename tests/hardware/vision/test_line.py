@@ -61,6 +61,10 @@ class Bench:
         return measure(Frame(0, 0.0, image), self.view, track or Track())[0]
 
 
+def scene_changed(view, **sizes):
+    return dataclasses.replace(view, scene=dataclasses.replace(view.scene, **sizes))
+
+
 def random_pose(rng, most_deg: float):
     return rng.uniform(-most_deg, most_deg, 2), (*rng.uniform(-0.025, 0.025, 2), 0.235)
 
@@ -192,7 +196,7 @@ def test_a_thicker_or_thinner_rod_is_not_our_stick():
     bench = Bench(FAULTLESS)
     image = bench.picture((0.0, 0.0))
     for radius in (0.0028, 0.0075):
-        other = dataclasses.replace(bench.view, stick_radius=radius)
+        other = scene_changed(bench.view, stick_radius=radius)
         flags = measure(Frame(0, 0.0, image), other, Track())[0].flags
         assert not line_is_good(flags)
 
@@ -207,7 +211,7 @@ def test_a_second_stick_makes_the_picture_ambiguous():
 
 def test_a_line_beside_the_pivot_is_flagged():
     bench = Bench(FAULTLESS)
-    wrong = dataclasses.replace(bench.view, marker_offset=(0.0035, -0.02, 0.025))
+    wrong = scene_changed(bench.view, marker_offset=(0.0035, -0.02, 0.025))
     found = measure(Frame(0, 0.0, bench.picture((0.0, 0.0))), wrong, Track())[0]
     assert Flag.OFF_PIVOT in Flag(found.flags)
 
