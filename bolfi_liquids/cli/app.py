@@ -2,14 +2,15 @@
 
 import signal
 import warnings
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from .. import __version__
 from ..inputs.settings import CalibrationSettings, CriticismSettings, PourSettings
+from ..wording import command
 from . import check as cli_check
 from . import guide, import_table
 from . import record as cli_record
@@ -25,9 +26,9 @@ from .options import (
     CalibrationData,
     CriticismData,
     ExecutionOptions,
-    PourData,
     PourOptions,
     RunArgument,
+    changed,
 )
 from .printed import (
     complaints_among_results,
@@ -105,17 +106,10 @@ def calibrate(
 
     if resume:
         check_resumable(out)
-    opened, table = open_recordings(recordings), given.table
+    opened, data = open_recordings(recordings), given.arguments
     with complaints_among_results(), compute.arguments() as where:
         calibration = run_calibrate(
-            opened,
-            out=out,
-            baseline=given.baseline or (),
-            pours=table,
-            cups=given.cups,
-            resume=resume,
-            **where,
-            **asdict(settings),
+            opened, out=out, resume=resume, **data, **where, **asdict(settings)
         )
     results = Results.of(calibration.run)
     print_calibration(calibration)
@@ -132,26 +126,16 @@ def calibrate(
 @grouped
 def criticise(
     run: RunArgument,
-    data: CriticismData,
-    poured: PourData,
+    given: CriticismData,
     settings: CriticismSettings,
     compute: ComputeOptions,
 ) -> None:
     """Find which effect the model lacks, where it misses the data."""
     from ..criticism.criticise import criticise as run_criticise
 
-    table, held_out_table = poured.table, poured.held_out_table
+    data = given.arguments
     with compute.arguments() as where:
-        criticism = run_criticise(
-            run,
-            held_out=data.held_out or (),
-            baseline=data.baseline or (),
-            pours=table,
-            held_out_pours=held_out_table,
-            cups=poured.cups,
-            **asdict(settings),
-            **where,
-        )
+        criticism = run_criticise(run, **data, **asdict(settings), **where)
     print_findings(criticism)
     print_next_pour(criticism.calibration)
 
@@ -177,39 +161,22 @@ def pour(
     With --execute nothing is chosen anew: it is a dry run of the chosen pour, unless armed.
     """
     if execution.execute:
-        if typed := [one for group in (options, settings, compute) for one in _changed(group)]:
+        if typed := changed(options, settings, compute):
             raise typer.BadParameter(
                 f"{', '.join(typed)}: of the choice of a pour, which is made without --execute; "
                 "with it the pour is carried out that RUN has chosen already"
             )
         cli_record.execute(run, execution)
         return
-    from ..inputs.cups import cups_of
     from ..pouring.choose import choose_pour
     from ..reporting.warnings import Results
 
-    cups, table = cups_of(options.cups), options.table
+    data = options.arguments
     with compute.arguments() as where:
-        chosen = choose_pour(
-            run,
-            cups,
-            given=table,
-            force=options.force,
-            **asdict(settings),
-            **where,
-        )
+        chosen = choose_pour(run, **data, **asdict(settings), **where)
     print_pour(chosen)
     print_warnings(Results.of(chosen.run))
-    print_next(run, "report")
-
-
-def _changed(group: Any) -> list[str]:
-    """The options of a group that are not the default."""
-    usual = type(group)()
-    names = [
-        one.name for one in fields(group) if getattr(group, one.name) != getattr(usual, one.name)
-    ]
-    return [f"--{name.replace('_', '-')}" for name in names]
+    print_next(command("report", run))
 
 
 @app.command(epilog=examples("report runs/mine", "report runs/mine --still"))
