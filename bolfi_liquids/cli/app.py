@@ -188,16 +188,23 @@ def report(
         bool,
         typer.Option(
             "--moving/--still",
-            help="With moving pictures of the liquid; the first time they take a minute.",
+            help="With moving pictures of the liquid; kept for later reports.",
         ),
     ] = True,
 ) -> None:
-    """Write RUN/report.html, one file that shows it all."""
+    """Write RUN/report.html, one file that shows it all.
+
+    A criticism or a pour that does not count is left out, with a warning; the exit status is 0.
+    """
     from ..reporting.report import report as write_report
+    from ..reporting.warnings import Results
+    from ..run.run import Run
 
     with compute.arguments() as where:
         path = write_report(run, moving=moving, **where)
     typer.echo(path)
+    for warning in Results.of(Run.open(run)).outdated:
+        typer.echo(f"warning: {warning}", err=True)
 
 
 @app.command(epilog=examples("demo --out runs/demo"))
