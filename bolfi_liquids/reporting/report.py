@@ -27,7 +27,7 @@ from .warnings import Results
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..inference.simulations import Compute, Workers
+    from ..inference.simulations import Workers
 
 PAGE_TEMPLATE, STYLE = "report.html.jinja", "report.css"
 
@@ -53,23 +53,6 @@ def report(
             command works in it.
         RuntimeError: A simulation took longer than `timeout`.
     """
-    with (
-        Run.entered(run) as opened,
-        open_compute(executor, timeout) as compute,
-    ):
-        return written(Results.of(opened), compute, moving=moving, progress=progress)
-
-
-def written(
-    results: Results, compute: "Compute", *, moving: bool = True, progress: bool = True
-) -> Path:
-    """Write RUN/report.html from given results.
-
-    Args:
-        results: What the run holds.
-        compute: Where moving pictures are simulated.
-        moving, progress: See `report`.
-    """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -79,22 +62,27 @@ def written(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    facts = results.facts
-    with ThreadPoolExecutor(1) as thread:
+    with (
+        Run.entered(run) as opened,
+        open_compute(executor, timeout) as compute,
+        ThreadPoolExecutor(1) as thread,
+    ):
+        results = Results.of(opened)
+        facts = results.facts
         drawn = thread.submit(figures_of, results)  # while this thread, or workers, make films
-        films = films_of(results.latest, results.pour, compute, progress=progress) if moving else []
-        figures = drawn.result()
-    page = environment.get_template(PAGE_TEMPLATE).render(
-        **facts,
-        prose=partial(prose, facts=facts),
-        figures=figures,
-        films=[film for film in films if film.path.stat().st_size],  # else it diverged
-        made_from=_made_from(results),
-        style=(files("bolfi_liquids.data") / STYLE).read_text(encoding="utf-8"),
-        record=results.calibration.record,
-        run=results.calibration.path,
-    )
-    return write_text(results.calibration.path / REPORT, page)
+        latest, pour = results.latest, results.pour
+        films = films_of(latest, pour, compute, progress=progress) if moving else []
+        page = environment.get_template(PAGE_TEMPLATE).render(
+            **facts,
+            prose=partial(prose, facts=facts),
+            figures=drawn.result(),
+            films=[film for film in films if film.path.stat().st_size],  # else it diverged
+            made_from=_made_from(results),
+            style=(files("bolfi_liquids.data") / STYLE).read_text(encoding="utf-8"),
+            record=opened.record,
+            run=opened.path,
+        )
+        return write_text(opened.path / REPORT, page)
 
 
 def figures_of(results: Results) -> dict[str, str]:
