@@ -12,14 +12,14 @@ from .. import __version__
 from ..inputs.settings import CalibrationSettings, CriticismSettings, PourSettings
 from ..wording import command
 from . import check as cli_check
-from . import guide, import_table
+from . import guide, import_table, printed
 from . import record as cli_record
 from . import rig as cli_rig
 from . import simulate as cli_simulate
 from . import trim as cli_trim
 from .compute import ComputeOptions, StudyComputeOptions
 from .errors import OneLineErrors
-from .examples import examples, session
+from .examples import examples
 from .grouped import grouped
 from .notices import print_notices
 from .options import (
@@ -30,25 +30,15 @@ from .options import (
     RunArgument,
     changed,
 )
-from .printed import (
-    complaints_among_results,
-    print_calibration,
-    print_findings,
-    print_next,
-    print_next_pour,
-    print_pour,
-    print_pour_before,
-    print_seconds,
-    print_warnings,
-)
 
 app = typer.Typer(
     cls=OneLineErrors,
     help="Learn a liquid by stirring it, then pour it without spilling.",
-    epilog=session(
+    epilog=examples(
         "calibrate stir.nc --out runs/mine",
         "pour runs/mine",
         "report runs/mine",
+        title="A session:",
         then="Without a recording, try `bolfi-liquids demo`; `bolfi-liquids guide` explains files, "
         "priors and messages.",
     ),
@@ -107,14 +97,14 @@ def calibrate(
     if resume:
         check_resumable(out)
     opened, data = open_recordings(recordings), given.arguments
-    with complaints_among_results(), compute.arguments() as where:
+    with printed.complaints_among_results(), compute.arguments() as where:
         calibration = run_calibrate(
             opened, out=out, resume=resume, **data, **where, **asdict(settings)
         )
     results = Results.of(calibration.run)
-    print_calibration(calibration)
-    print_warnings(results)
-    print_next_pour(results.latest, "criticise")
+    printed.print_calibration(calibration)
+    printed.print_warnings(results)
+    printed.print_next_pour(results.latest, "criticise")
 
 
 @app.command(
@@ -136,8 +126,8 @@ def criticise(
     data = given.arguments
     with compute.arguments() as where:
         criticism = run_criticise(run, **data, **asdict(settings), **where)
-    print_findings(criticism)
-    print_next_pour(criticism.calibration)
+    printed.print_findings(criticism)
+    printed.print_next_pour(criticism.calibration)
 
 
 @app.command(
@@ -174,9 +164,9 @@ def pour(
     data = options.arguments
     with compute.arguments() as where:
         chosen = choose_pour(run, **data, **asdict(settings), **where)
-    print_pour(chosen)
-    print_warnings(Results.of(chosen.run))
-    print_next(command("report", run))
+    printed.print_pour(chosen)
+    printed.print_warnings(Results.of(chosen.run))
+    printed.print_next(command("report", run))
 
 
 @app.command(epilog=examples("report runs/mine", "report runs/mine --still"))
@@ -219,13 +209,13 @@ def demo(
     from ..demo import run_demo
     from ..reporting.warnings import Results
 
-    with complaints_among_results(), compute.opened() as opened:
-        made = run_demo(out, compute=opened, fitted=print_calibration)
-    print_findings(made.criticism)
-    print_pour_before(made.pour_before)
-    print_pour(made.pour)
-    print_warnings(Results.of(made.calibration.run))
-    print_seconds(made.seconds)
+    with printed.complaints_among_results(), compute.opened() as opened:
+        made = run_demo(out, compute=opened, fitted=printed.print_calibration)
+    printed.print_findings(made.criticism)
+    printed.print_pour_before(made.pour_before)
+    printed.print_pour(made.pour)
+    printed.print_warnings(Results.of(made.calibration.run))
+    printed.print_seconds(made.seconds)
     typer.echo(f"report: {made.report}")
 
 
