@@ -135,7 +135,8 @@ class ExecutionOptions:
 def need(options: object, needed: str, *names: str) -> None:
     """Refuse options `names` of a group where the option `needed` was not given."""
     for name in names:
-        if getattr(options, name) not in (None, False) and not getattr(options, needed):
+        usual = type(options).__dataclass_fields__[name].default  # type: ignore[attr-defined]
+        if getattr(options, name) != usual and not getattr(options, needed):
             given, missing = as_typed(name, needed)
             raise typer.BadParameter(f"{given} needs {missing}, which is missing")
 

@@ -38,9 +38,7 @@ class ArmOptions:
     emulator: Annotated[
         bool, typer.Option("--emulator", help="All of it with an emulated arm and cameras.")
     ] = False
-    viscosity: Annotated[
-        float | None, typer.Option(help="Of the emulated liquid [Pa s]; else 1.")
-    ] = None
+    viscosity: Annotated[float, typer.Option(help="Of the emulated liquid [Pa s].")] = 1.0
 
     def __post_init__(self) -> None:
         one_arm(self.arm, self.emulator)
@@ -51,8 +49,8 @@ class ArmOptions:
         """Who is asked and what is emulated, as `record` takes them."""
         from ..hardware import HiddenLiquid
 
-        liquid = None if self.viscosity is None else HiddenLiquid(viscosity=self.viscosity)
-        return {"ask": typed_sentence if self.arm else None, "emulate": liquid or self.emulator}
+        liquid = HiddenLiquid(viscosity=self.viscosity) if self.emulator else False
+        return {"ask": typed_sentence if self.arm else None, "emulate": liquid}
 
 
 @dataclass(frozen=True)
@@ -67,30 +65,22 @@ class OnlineOptions:
         Path | None, typer.Option(metavar="FILE", help="cups.toml of the pour, for --calibrate.")
     ] = None
     target: Annotated[
-        float | None,
-        typer.Option(
-            help="Spilled share at which stirring may end, for --calibrate; "
-            f"else {OnlineSettings().target:g}."
-        ),
-    ] = None
+        float, typer.Option(help="Spilled share at which stirring may end, for --calibrate.")
+    ] = OnlineSettings().target
 
     def __post_init__(self) -> None:
         need(self, "calibrate", "cups", "target")
 
     def choice(self, cycles: int | None) -> "OnlineChoice | None":
         """What to calibrate, with so many cycles at the most; None for nothing."""
-        from ..inputs.cups import open_cups
+        from ..inputs.cups import cups_of
         from ..online.online import USUAL_CYCLES, OnlineChoice
 
         if self.calibrate is None:
             return None
-        settings = OnlineSettings() if self.target is None else OnlineSettings(target=self.target)
-        return OnlineChoice(
-            self.calibrate,
-            None if self.cups is None else open_cups(self.cups),
-            settings,
-            cycles=USUAL_CYCLES if cycles is None else cycles,
-        )
+        settings = OnlineSettings(target=self.target)
+        cycles = USUAL_CYCLES if cycles is None else cycles
+        return OnlineChoice(self.calibrate, cups_of(self.cups), settings, cycles=cycles)
 
 
 @grouped

@@ -1,7 +1,7 @@
 """From particles to the surface of the liquid, as a camera sees it.
 
 All of it is computed in the picture's own pixels (van der Laan, Green and Sainz 2009): no grid in
-space, no mesh. It takes some 10 ms of processor time for a picture of 5000 particles.
+space, no mesh. A picture of 4000 particles, 640 pixels wide, takes 25 ms of processor time.
 """
 
 from dataclasses import dataclass

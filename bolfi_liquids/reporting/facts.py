@@ -20,7 +20,6 @@ from ..inference.criticism.verdict_kind import VerdictKind
 from ..models.numerics import TESTED_RATIO
 from ..pouring.draining import TENTH, Hold
 from ..pouring.result import ActionSummary, GivenPour, GivenSummary, Pour
-from ..pouring.spillage import ACTION
 from ..wording import (
     LEAST_SPILLED,
     LIQUID_UNITS,
@@ -62,12 +61,7 @@ MAX_LISTED = 3
 MUCH_SPILLED = 0.05
 """Expected spillage that a person would mop up."""
 
-ACTION_ENDS = {
-    ("angular_velocity", 0): "slowest",
-    ("angular_velocity", 1): "fastest",
-    ("distance", 0): "nearest",
-    ("distance", 1): "farthest",
-}
+ACTION_ENDS = {"angular_velocity": ("slowest", "fastest"), "distance": ("nearest", "farthest")}
 """What an action at either end of the range of each quantity is called."""
 
 NONE = "–"
@@ -408,9 +402,9 @@ def _ends(pour: "DataTree") -> list[str]:
     """The ends of what was allowed at which the chosen pour is; a better one may lie beyond."""
     actions, chosen = pour["actions"], pour["chosen"].attrs
     return [
-        ACTION_ENDS[name, end]
-        for name in ACTION
-        for end, limit in enumerate(actions[name].to_numpy()[[0, -1]])
+        end
+        for name, ends in ACTION_ENDS.items()
+        for end, limit in zip(ends, actions[name].to_numpy()[[0, -1]], strict=True)
         if np.isclose(chosen[name], limit)
     ]
 
