@@ -18,8 +18,7 @@ from .inputs.open import open_recording
 from .inputs.settings import CalibrationSettings, PourSettings
 from .models import runtime
 from .pouring.choose import choose_pour, decided
-from .reporting.report import written
-from .reporting.warnings import Results
+from .reporting.report import report
 from .run.run import RUN_TOML, Run
 
 if TYPE_CHECKING:
@@ -84,7 +83,6 @@ def run_demo(
     ):
         workers = compute.executor
         where: dict[str, Any] = {"executor": workers, "timeout": compute.timeout}
-
         if workers is not None:  # they load Taichi while this process loads JAX
             for _ in range(2):
                 workers.submit(runtime.start)
@@ -103,8 +101,7 @@ def run_demo(
         ends["criticise, pour before it"] = time.perf_counter()
         pour = choose_pour(criticism, budget=POURS, **where)
         ends["pour"] = time.perf_counter()
-        with Run.entered(out) as run:
-            page = written(Results.of(run), compute)
+        page = report(out, **where)
         ends["report"] = time.perf_counter()
     seconds = {phase: end - before for (_, before), (phase, end) in pairwise(ends.items())}
     return Demo(calibration, criticism, pour, pour_before, page, seconds)

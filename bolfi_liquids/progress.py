@@ -34,16 +34,10 @@ def phases(*, shown: bool) -> Iterator[Callable[[str, int], None]]:
         Called with the phase and the simulations finished in it since the last call.
     """
     from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    console = Console(stderr=True)
-    if not shown:
-        yield lambda phase, finished: None
-        return
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    console = Console(stderr=True, quiet=not shown)
     count, current = 0, ""
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
-        handle = bar.add_task("starting", total=None)
+    with console.status("starting") as status:  # nothing without a terminal
 
         def report(phase: str, finished: int) -> None:
             nonlocal count, current
@@ -51,6 +45,6 @@ def phases(*, shown: bool) -> Iterator[Callable[[str, int], None]]:
                 console.print(f"{phase} (after {count} simulations)", highlight=False)
             count += finished
             current = phase
-            bar.update(handle, description=f"{phase} ({count} simulations)")
+            status.update(f"{phase} ({count} simulations)")
 
         yield report

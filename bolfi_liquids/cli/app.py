@@ -2,52 +2,43 @@
 
 import signal
 import warnings
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from .. import __version__
 from ..inputs.settings import CalibrationSettings, CriticismSettings, PourSettings
+from ..wording import command
 from . import check as cli_check
-from . import guide, import_table
+from . import guide, import_table, printed
 from . import record as cli_record
 from . import rig as cli_rig
 from . import simulate as cli_simulate
 from . import trim as cli_trim
 from .compute import ComputeOptions, StudyComputeOptions
 from .errors import OneLineErrors
-from .examples import examples, session
+from .examples import examples
 from .grouped import grouped
 from .notices import print_notices
 from .options import (
     CalibrationData,
     CriticismData,
     ExecutionOptions,
-    PourData,
     PourOptions,
     RunArgument,
-)
-from .printed import (
-    complaints_among_results,
-    print_calibration,
-    print_findings,
-    print_next,
-    print_next_pour,
-    print_pour,
-    print_pour_before,
-    print_seconds,
-    print_warnings,
+    changed,
 )
 
 app = typer.Typer(
     cls=OneLineErrors,
     help="Learn a liquid by stirring it, then pour it without spilling.",
-    epilog=session(
+    epilog=examples(
         "calibrate stir.nc --out runs/mine",
         "pour runs/mine",
         "report runs/mine",
+        title="A session:",
         then="Without a recording, try `bolfi-liquids demo`; `bolfi-liquids guide` explains files, "
         "priors and messages.",
     ),
@@ -105,22 +96,15 @@ def calibrate(
 
     if resume:
         check_resumable(out)
-    opened, table = open_recordings(recordings), given.table
-    with complaints_among_results(), compute.arguments() as where:
+    opened, data = open_recordings(recordings), given.arguments
+    with printed.complaints_among_results(), compute.arguments() as where:
         calibration = run_calibrate(
-            opened,
-            out=out,
-            baseline=given.baseline or (),
-            pours=table,
-            cups=given.cups,
-            resume=resume,
-            **where,
-            **asdict(settings),
+            opened, out=out, resume=resume, **data, **where, **asdict(settings)
         )
     results = Results.of(calibration.run)
-    print_calibration(calibration)
-    print_warnings(results)
-    print_next_pour(results.latest, "criticise")
+    printed.print_calibration(calibration)
+    printed.print_warnings(results)
+    printed.print_next_pour(results.latest, "criticise")
 
 
 @app.command(
@@ -132,28 +116,18 @@ def calibrate(
 @grouped
 def criticise(
     run: RunArgument,
-    data: CriticismData,
-    poured: PourData,
+    given: CriticismData,
     settings: CriticismSettings,
     compute: ComputeOptions,
 ) -> None:
     """Find which effect the model lacks, where it misses the data."""
     from ..criticism.criticise import criticise as run_criticise
 
-    table, held_out_table = poured.table, poured.held_out_table
+    data = given.arguments
     with compute.arguments() as where:
-        criticism = run_criticise(
-            run,
-            held_out=data.held_out or (),
-            baseline=data.baseline or (),
-            pours=table,
-            held_out_pours=held_out_table,
-            cups=poured.cups,
-            **asdict(settings),
-            **where,
-        )
-    print_findings(criticism)
-    print_next_pour(criticism.calibration)
+        criticism = run_criticise(run, **data, **asdict(settings), **where)
+    printed.print_findings(criticism)
+    printed.print_next_pour(criticism.calibration)
 
 
 @app.command(
@@ -177,39 +151,22 @@ def pour(
     With --execute nothing is chosen anew: it is a dry run of the chosen pour, unless armed.
     """
     if execution.execute:
-        if typed := [one for group in (options, settings, compute) for one in _changed(group)]:
+        if typed := changed(options, settings, compute):
             raise typer.BadParameter(
                 f"{', '.join(typed)}: of the choice of a pour, which is made without --execute; "
                 "with it the pour is carried out that RUN has chosen already"
             )
         cli_record.execute(run, execution)
         return
-    from ..inputs.cups import cups_of
     from ..pouring.choose import choose_pour
     from ..reporting.warnings import Results
 
-    cups, table = cups_of(options.cups), options.table
+    data = options.arguments
     with compute.arguments() as where:
-        chosen = choose_pour(
-            run,
-            cups,
-            given=table,
-            force=options.force,
-            **asdict(settings),
-            **where,
-        )
-    print_pour(chosen)
-    print_warnings(Results.of(chosen.run))
-    print_next(run, "report")
-
-
-def _changed(group: Any) -> list[str]:
-    """The options of a group that are not the default."""
-    usual = type(group)()
-    names = [
-        one.name for one in fields(group) if getattr(group, one.name) != getattr(usual, one.name)
-    ]
-    return [f"--{name.replace('_', '-')}" for name in names]
+        chosen = choose_pour(run, **data, **asdict(settings), **where)
+    printed.print_pour(chosen)
+    printed.print_warnings(Results.of(chosen.run))
+    printed.print_next(command("report", run))
 
 
 @app.command(epilog=examples("report runs/mine", "report runs/mine --still"))
@@ -221,16 +178,23 @@ def report(
         bool,
         typer.Option(
             "--moving/--still",
-            help="With moving pictures of the liquid; the first time they take a minute.",
+            help="With moving pictures of the liquid; kept for later reports.",
         ),
     ] = True,
 ) -> None:
-    """Write RUN/report.html, one file that shows it all."""
+    """Write RUN/report.html, one file that shows it all.
+
+    A criticism or a pour that does not count is left out, with a warning; the exit status is 0.
+    """
     from ..reporting.report import report as write_report
+    from ..reporting.warnings import Results
+    from ..run.run import Run
 
     with compute.arguments() as where:
         path = write_report(run, moving=moving, **where)
     typer.echo(path)
+    for warning in Results.of(Run.open(run)).outdated:
+        typer.echo(f"warning: {warning}", err=True)
 
 
 @app.command(epilog=examples("demo --out runs/demo"))
@@ -245,13 +209,13 @@ def demo(
     from ..demo import run_demo
     from ..reporting.warnings import Results
 
-    with complaints_among_results(), compute.opened() as opened:
-        made = run_demo(out, compute=opened, fitted=print_calibration)
-    print_findings(made.criticism)
-    print_pour_before(made.pour_before)
-    print_pour(made.pour)
-    print_warnings(Results.of(made.calibration.run))
-    print_seconds(made.seconds)
+    with printed.complaints_among_results(), compute.opened() as opened:
+        made = run_demo(out, compute=opened, fitted=printed.print_calibration)
+    printed.print_findings(made.criticism)
+    printed.print_pour_before(made.pour_before)
+    printed.print_pour(made.pour)
+    printed.print_warnings(Results.of(made.calibration.run))
+    printed.print_seconds(made.seconds)
     typer.echo(f"report: {made.report}")
 
 

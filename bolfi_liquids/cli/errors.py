@@ -5,6 +5,7 @@ import os
 import sqlite3
 import sys
 import traceback
+from argparse import ArgumentParser
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -108,13 +109,13 @@ def _refuse_empty(arguments: list[str]) -> None:
     Raises:
         InputError: There is one.
     """
-    for before, argument in zip(["", *arguments], arguments, strict=False):
-        option, given, value = argument.partition("=")
-        if not argument.strip():
-            option = before if before.startswith("-") else "an argument"
-        elif not (option.startswith("--") and given and not value.strip()):
-            continue
-        raise InputError("is empty", where=option, fix="give a value; was a variable not set?")
+    for before, argument in pairwise(["", *arguments]):
+        option, value = before, argument
+        if argument.startswith("--") and "=" in argument:
+            option, _, value = argument.partition("=")
+        if not value.strip():
+            named = option if option.startswith("-") else "an argument"
+            raise InputError("is empty", where=named, fix="give a value; was a variable not set?")
 
 
 def _explained(err: Exception) -> str:
@@ -143,20 +144,11 @@ def _how_to_go_on(arguments: list[str]) -> str:
 
     again, begun = command(*arguments), True
     if "calibrate" in arguments and "--resume" not in arguments:
-        out = _value_of("--out", arguments)
-        begun = bool(out) and (Path(out) / RUN_TOML).exists()
+        options = ArgumentParser(add_help=False, allow_abbrev=False)
+        options.add_argument("--out", type=Path)
+        out = options.parse_known_args(arguments)[0].out
+        begun = out is not None and (out / RUN_TOML).exists()
         again += " --resume" if begun else ""
     if not begun:
         return f"interrupted before anything was kept; begin again with: {again}"
     return f"interrupted: what has finished is kept; go on with: {again}"
-
-
-def _value_of(option: str, arguments: list[str]) -> str:
-    """The last value that an option was given; "" if none."""
-    found = ""
-    for before, argument in pairwise(["", *arguments]):
-        if before == option:
-            found = argument
-        elif argument.startswith(f"{option}="):
-            found = argument.removeprefix(f"{option}=")
-    return found

@@ -48,8 +48,11 @@ def grouped(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _of_fields(group: Any) -> list[inspect.Parameter]:
-    settings = is_pydantic_dataclass(group)
-    hints = _of_settings(group) if settings else get_type_hints(group, include_extras=True)
+    """An option for each field; those of settings check their values by their own rules."""
+    if is_pydantic_dataclass(group):
+        hints = {field.name: _typed(setting(group, field.name)) for field in fields(group)}
+    else:
+        hints = get_type_hints(group, include_extras=True)
     return [
         inspect.Parameter(
             field.name,
@@ -59,11 +62,6 @@ def _of_fields(group: Any) -> list[inspect.Parameter]:
         )
         for field in fields(group)
     ]
-
-
-def _of_settings(group: Any) -> dict[str, Any]:
-    """Typer's annotations of settings; their own rules check the values."""
-    return {field.name: _typed(setting(group, field.name)) for field in fields(group)}
 
 
 def setting(settings: Any, name: str) -> FieldInfo:

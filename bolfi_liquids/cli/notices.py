@@ -13,10 +13,11 @@ class _ToStderr(logging.Handler):
         print(self.format(record), file=sys.stderr)
 
 
+_TO_STDERR = _ToStderr()
+
+
 def print_notices() -> None:
     """Have the package's notices printed; a second call changes nothing."""
     logger = logging.getLogger(PACKAGE)
-    if any(isinstance(handler, _ToStderr) for handler in logger.handlers):
-        return
-    logger.addHandler(_ToStderr(logging.INFO))
+    logger.addHandler(_TO_STDERR)
     logger.setLevel(logging.INFO)

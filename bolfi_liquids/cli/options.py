@@ -1,8 +1,9 @@
 """Options of the commands, in groups that become arguments of one function each."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -27,28 +28,6 @@ LiquidOption = Annotated[
     str | None,
     typer.Option("--liquid", metavar="NAME", help="Whose pours count, if the table has several."),
 ]
-
-
-@dataclass(frozen=True)
-class GivenPourOptions:
-    """Pours of the liquid that were made, and the cups."""
-
-    pours: Annotated[
-        Path | None,
-        typer.Option(metavar="TABLE", help="What pours of the liquid spilled: they count in pour."),
-    ] = None
-    liquid: LiquidOption = None
-    cups: CupsOption = None
-
-    def __post_init__(self) -> None:
-        _need(self, "--pours", self.pours, ("liquid", "cups"))
-
-    @property
-    def table(self) -> "PourTable | None":
-        """The pours."""
-        return opened_pours(self.pours, self.liquid)
-
-
 BaselineOption = Annotated[
     list[Path] | None,
     typer.Option(
@@ -59,39 +38,48 @@ BaselineOption = Annotated[
 
 
 @dataclass(frozen=True)
-class CalibrationData(GivenPourOptions):
-    """The same, and what the simulator's error is learned from."""
+class CalibrationData:
+    """What is learned from besides the recordings: pours of the liquid, and clean recordings."""
 
+    pours: Annotated[
+        Path | None,
+        typer.Option(metavar="TABLE", help="What pours of the liquid spilled: they count in pour."),
+    ] = None
+    liquid: LiquidOption = None
+    cups: CupsOption = None
     baseline: BaselineOption = None
+
+    def __post_init__(self) -> None:
+        need(self, "pours", "liquid", "cups")
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """As `calibrate` takes them."""
+        pours = opened_pours(self.pours, self.liquid)
+        return {"pours": pours, "cups": self.cups, "baseline": self.baseline or ()}
 
 
 @dataclass(frozen=True)
-class CriticismData:
-    """Data that a criticism compares besides the calibrated recordings."""
+class CriticismData(CalibrationData):
+    """The same, and what nothing is fitted to."""
 
     held_out: Annotated[
         list[Path] | None,
         typer.Option(metavar="RECORDING", help="Same liquid, other path or speed: the proof."),
     ] = None
-    baseline: BaselineOption = None
-
-
-@dataclass(frozen=True)
-class PourData(GivenPourOptions):
-    """The same, and pours that nothing is fitted to."""
-
     held_out_pours: Annotated[
         Path | None, typer.Option(metavar="TABLE", help="Other pours of the liquid: the proof.")
     ] = None
 
     def __post_init__(self) -> None:
-        super().__post_init__()
-        _need(self, "--pours", self.pours, ("held_out_pours",))
+        need(self, "pours", "liquid", "cups", "held_out_pours")
 
     @property
-    def held_out_table(self) -> "PourTable | None":
-        """Pours that nothing is fitted to."""
-        return opened_pours(self.held_out_pours, self.liquid)
+    def arguments(self) -> dict[str, Any]:
+        """As `criticise` takes them."""
+        held_out_pours = opened_pours(self.held_out_pours, self.liquid)
+        unseen = {"held_out": self.held_out or (), "held_out_pours": held_out_pours}
+        return super().arguments | unseen
 
 
 @dataclass(frozen=True)
@@ -106,23 +94,18 @@ class PourOptions:
         ),
     ] = None
     liquid: LiquidOption = None
-    pours: Annotated[str | None, typer.Option(hidden=True)] = None
     force: Annotated[
         bool, typer.Option("--force", help="Choose a pour even though the fit is bad.")
     ] = False
 
     def __post_init__(self) -> None:
-        if self.pours is not None:
-            raise typer.BadParameter(
-                "--pours is no option of pour: --given is a table of pours that were made, "
-                "--budget the number of pours to simulate"
-            )
-        _need(self, "--given", self.given, ("liquid",))
+        need(self, "given", "liquid")
 
     @property
-    def table(self) -> "PourTable | None":
-        """The pours that were made."""
-        return opened_pours(self.given, self.liquid)
+    def arguments(self) -> dict[str, Any]:
+        """As `choose_pour` takes them."""
+        given = opened_pours(self.given, self.liquid)
+        return {"cups": self.cups, "given": given, "force": self.force}
 
 
 @dataclass(frozen=True)
@@ -145,15 +128,40 @@ class ExecutionOptions:
     ] = False
 
     def __post_init__(self) -> None:
-        _need(self, "--execute", self.execute, ("arm", "emulator", "rig", "despite_bad_fit"))
+        need(self, "execute", "arm", "emulator", "rig", "despite_bad_fit")
+        one_arm(self.arm, self.emulator)
 
 
-def _need(options: object, needed: str, given: object, names: tuple[str, ...]) -> None:
-    """Refuse options `names` of a group where the option `needed` is not `given`."""
+def need(options: object, needed: str, *names: str) -> None:
+    """Refuse options `names` of a group where the option `needed` was not given."""
     for name in names:
-        if getattr(options, name) and not given:
-            option = name.replace("_", "-")
-            raise typer.BadParameter(f"--{option} needs {needed}, which is missing")
+        usual = type(options).__dataclass_fields__[name].default  # type: ignore[attr-defined]
+        if getattr(options, name) != usual and not getattr(options, needed):
+            given, missing = as_typed(name, needed)
+            raise typer.BadParameter(f"{given} needs {missing}, which is missing")
+
+
+def one_arm(arm: bool, emulator: bool) -> None:
+    """Refuse a real and an emulated arm together."""
+    if arm and emulator:
+        raise typer.BadParameter("--arm moves a real arm, --emulator an emulated one: give one")
+
+
+def changed(*groups: Any) -> Sequence[str]:
+    """The options in groups that are not the default, as they are typed."""
+    return as_typed(
+        *(
+            name
+            for group in groups
+            for name, value in vars(group).items()
+            if value != getattr(type(group)(), name)
+        )
+    )
+
+
+def as_typed(*names: str) -> Sequence[str]:
+    """Options of these fields."""
+    return [f"--{name.replace('_', '-')}" for name in names]
 
 
 def opened_pours(path: Path | None, liquid: str | None) -> "PourTable | None":

@@ -3,7 +3,6 @@
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -11,9 +10,6 @@ import typer
 from ..wording import command
 
 if TYPE_CHECKING:
-    from rich.console import Console
-    from rich.table import Table
-
     from ..calibration.result import Calibration
     from ..criticism.result import Criticism
     from ..hardware import Check
@@ -32,17 +28,18 @@ def complaints_among_results() -> Iterator[None]:
         yield
 
 
-def print_next(run: Path, *commands: str) -> None:
+def print_next(*commands: str) -> None:
     """The commands that may follow, to be copied."""
-    typer.echo("next: " + " or: ".join(command(one, run) for one in commands))
+    typer.echo("next: " + " or: ".join(commands))
 
 
 def print_next_pour(calibration: "Calibration", *others: str) -> None:
-    """The same, and `pour`, or `report` where `pour` would refuse this fit."""
+    """The same of a run, with `pour`, or `report` where `pour` would refuse this fit."""
     from ..calibration.summary import FitStatus
 
     fit_is_bad = calibration.summary.fit_status == FitStatus.BAD
-    print_next(calibration.path, *others, "report" if fit_is_bad else "pour")
+    steps = (*others, "report" if fit_is_bad else "pour")
+    print_next(*(command(step, calibration.path) for step in steps))
 
 
 def print_calibration(calibration: "Calibration") -> None:
@@ -50,11 +47,9 @@ def print_calibration(calibration: "Calibration") -> None:
     from ..reporting.facts import calibration_facts
 
     facts = calibration_facts(calibration)
-    table = _table("parameter", "mean", "sd", "5 %", "50 %", "95 %", "closest")
-    for one in facts["parameters"]:
-        numbers = ("mean", "sd", "q05", "q50", "q95", "closest")
-        table.add_row(f"{one['name']} {one['unit']}".strip(), *(one[name] for name in numbers))
-    _console().print(table)
+    rows = {f"{one['name']} {one['unit']}".strip(): one for one in facts["parameters"]}
+    columns = {"mean": "mean", "sd": "sd", "5 %": "q05", "50 %": "q50", "95 %": "q95"}
+    _print_table("parameter", columns | {"closest": "closest"}, rows)
     _print_prose(("fit", "effort"), {"calibration": facts})
 
 
@@ -63,17 +58,14 @@ def print_pour(pour: "Pour") -> None:
     from ..reporting.facts import pour_facts
 
     facts = pour_facts(pour)
-    table = _table("pour", "turn", "distance", "expected spillage", "in 19 of 20 cases")
-    for label, action in (("chosen", facts), ("for the best fit alone", facts["plug_in"])):
-        numbers = ("turn", "distance", "spilled", "spilled_q95")
-        table.add_row(label, *(action[name] for name in numbers))
-    _console().print(table)
+    rows = {"chosen": facts, "for the best fit alone": facts["plug_in"]}
+    action = {"turn": "turn", "distance": "distance"}
+    outcome = {"expected spillage": "spilled", "in 19 of 20 cases": "spilled_q95"}
+    _print_table("pour", action | outcome, rows)
     if facts["given"] is not None:
-        table = _table("given pour", "turn", "distance", "spilled", "expected by simulator alone")
-        for one in facts["given"]["nearest"]:
-            numbers = ("turn", "distance", "spilled", "expected")
-            table.add_row(f"line {one['line']}", *(one[name] for name in numbers))
-        _console().print(table)
+        rows = {f"line {one['line']}": one for one in facts["given"]["nearest"]}
+        outcome = {"spilled": "spilled", "expected by simulator alone": "expected"}
+        _print_table("given pour", action | outcome, rows)
     _print_prose(("pour",), {"pour": facts})
 
 
@@ -91,17 +83,10 @@ def print_findings(criticism: "Criticism") -> None:
     from ..reporting.facts import criticism_facts
 
     facts = criticism_facts(criticism)
-    parts = {
-        "verdict": True,
-        "baseline": True,
-        "criticism": True,
-        "gap": True,
-        "where": facts["where"],
-        "detectable": True,
-        "poured": facts["pours"],
-        "next": facts["suggestions"],
-    }
-    _print_prose([part for part, told in parts.items() if told], {"criticism": facts})
+    of_what_there_is = {"where": "where", "poured": "pours", "next": "suggestions"}
+    parts = ("verdict", "baseline", "criticism", "gap", "where", "detectable", "poured", "next")
+    told = [part for part in parts if facts.get(of_what_there_is.get(part, part), True)]
+    _print_prose(told, {"criticism": facts})
 
 
 def print_warnings(results: "Results") -> None:
@@ -115,10 +100,11 @@ def print_warnings(results: "Results") -> None:
 def print_seconds(seconds: Mapping[str, float]) -> None:
     """Seconds of each phase, and their share."""
     total = sum(seconds.values())
-    table = _table("phase", "seconds", "share")
-    for phase, spent in (*seconds.items(), ("all", total)):
-        table.add_row(phase, f"{spent:.1f}", f"{spent / total:.0%}")
-    _console().print(table)
+    rows = {
+        phase: {"seconds": f"{spent:.1f}", "share": f"{spent / total:.0%}"}
+        for phase, spent in {**seconds, "all": total}.items()
+    }
+    _print_table("phase", {"seconds": "seconds", "share": "share"}, rows)
 
 
 def print_checks(checks: "Sequence[Check]") -> None:
@@ -129,7 +115,7 @@ def print_checks(checks: "Sequence[Check]") -> None:
     table = Table("what", "", "how")
     for check in checks:
         table.add_row(check.name, "ok" if check.ok else "[bold red]no[/]", escape(check.text))
-    _console().print(table)
+    _print(table, markup=True)
 
 
 def print_recording(recording: "Recording") -> None:
@@ -145,10 +131,20 @@ def print_recording(recording: "Recording") -> None:
     )
 
 
-def _table(label: str, *numbers: str) -> "Table":
+def _print_table(label: str, columns: Mapping[str, str], rows: Mapping[str, Any]) -> None:
+    """A table of numbers.
+
+    Args:
+        label: What the rows are.
+        columns: Heading -> which fact of a row.
+        rows: Facts by the rows' names.
+    """
     from rich.table import Column, Table
 
-    return Table(label, *(Column(heading, justify="right") for heading in numbers))
+    table = Table(label, *(Column(heading, justify="right") for heading in columns))
+    for name, facts in rows.items():
+        table.add_row(name, *(facts[fact] for fact in columns.values()))
+    _print(table)
 
 
 def _print_prose(parts: Iterable[str], facts: Mapping[str, Any]) -> None:
@@ -159,12 +155,8 @@ def _print_prose(parts: Iterable[str], facts: Mapping[str, Any]) -> None:
         _print(paragraph)
 
 
-def _print(text: str, *, soft_wrap: bool = False) -> None:
-    """Print a text as it is, without the colours that rich gives to numbers and paths."""
-    _console().print(text, highlight=False, markup=False, soft_wrap=soft_wrap)
-
-
-def _console() -> "Console":
+def _print(shown: Any, *, markup: bool = False, soft_wrap: bool = False) -> None:
+    """Print as it is, without the colours that rich gives to numbers and paths."""
     from rich.console import Console
 
-    return Console()
+    Console().print(shown, highlight=False, markup=markup, soft_wrap=soft_wrap)

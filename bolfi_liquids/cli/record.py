@@ -15,10 +15,10 @@ from ..wording import command
 from .errors import FAILED, INTERRUPTED, Aborted
 from .examples import examples
 from .grouped import grouped
-from .options import ExecutionOptions, RigOption
+from .options import ExecutionOptions, RigOption, need, one_arm
 
 if TYPE_CHECKING:
-    from ..hardware import Check, HiddenLiquid
+    from ..hardware import Check
     from ..online.online import OnlineChoice
 
 OUT = Path("runs/recording")
@@ -38,22 +38,19 @@ class ArmOptions:
     emulator: Annotated[
         bool, typer.Option("--emulator", help="All of it with an emulated arm and cameras.")
     ] = False
-    viscosity: Annotated[
-        float | None, typer.Option(help="Of the emulated liquid [Pa s]; else 1.")
-    ] = None
+    viscosity: Annotated[float, typer.Option(help="Of the emulated liquid [Pa s].")] = 1.0
 
     def __post_init__(self) -> None:
-        _one_of(self.arm, self.emulator)
-        _needs("--emulator", self.emulator or None, {"--viscosity": self.viscosity})
+        one_arm(self.arm, self.emulator)
+        need(self, "emulator", "viscosity")
 
     @property
-    def emulate(self) -> "HiddenLiquid | bool":
-        """As `record` takes it."""
+    def arguments(self) -> dict[str, Any]:
+        """Who is asked and what is emulated, as `record` takes them."""
         from ..hardware import HiddenLiquid
 
-        if self.viscosity is None:
-            return self.emulator
-        return HiddenLiquid(viscosity=self.viscosity)
+        liquid = HiddenLiquid(viscosity=self.viscosity) if self.emulator else False
+        return {"ask": typed_sentence if self.arm else None, "emulate": liquid}
 
 
 @dataclass(frozen=True)
@@ -68,30 +65,22 @@ class OnlineOptions:
         Path | None, typer.Option(metavar="FILE", help="cups.toml of the pour, for --calibrate.")
     ] = None
     target: Annotated[
-        float | None,
-        typer.Option(
-            help="Spilled share at which stirring may end, for --calibrate; "
-            f"else {OnlineSettings().target:g}."
-        ),
-    ] = None
+        float, typer.Option(help="Spilled share at which stirring may end, for --calibrate.")
+    ] = OnlineSettings().target
 
     def __post_init__(self) -> None:
-        _needs("--calibrate", self.calibrate, {"--cups": self.cups, "--target": self.target})
+        need(self, "calibrate", "cups", "target")
 
     def choice(self, cycles: int | None) -> "OnlineChoice | None":
         """What to calibrate, with so many cycles at the most; None for nothing."""
-        from ..inputs.cups import open_cups
+        from ..inputs.cups import cups_of
         from ..online.online import USUAL_CYCLES, OnlineChoice
 
         if self.calibrate is None:
             return None
-        settings = OnlineSettings() if self.target is None else OnlineSettings(target=self.target)
-        return OnlineChoice(
-            self.calibrate,
-            None if self.cups is None else open_cups(self.cups),
-            settings,
-            cycles=USUAL_CYCLES if cycles is None else cycles,
-        )
+        settings = OnlineSettings(target=self.target)
+        cycles = USUAL_CYCLES if cycles is None else cycles
+        return OnlineChoice(self.calibrate, cups_of(self.cups), settings, cycles=cycles)
 
 
 @grouped
@@ -116,30 +105,27 @@ def record(
     from ..reporting.warnings import Results
     from ..robot.record import dry_stir
     from ..robot.record import record as run_record
-    from .printed import print_calibration, print_recording, print_warnings
+    from .printed import print_calibration, print_next, print_recording, print_warnings
 
     opened = rig_of(rig)
     if not (moved.arm or moved.emulator):
         _tell_dry(*dry_stir(opened, cycles, out))
         return
-    ask = typed_sentence if moved.arm else None
-    given: dict[str, Any] = {"out": out, "ask": ask, "emulate": moved.emulate}
     choice = online.choice(cycles)
     with aborted_is_told():
         if choice is None:
-            recording = run_record(opened, cycles=cycles, **given)
+            recording = run_record(opened, cycles=cycles, out=out, **moved.arguments)
         else:
-            recording = record_online(opened, online=choice, **given)
+            recording = record_online(opened, online=choice, out=out, **moved.arguments)
     print_recording(recording)
-    if choice is not None:
-        calibration = Calibration.open(Path(choice.run))
+    if online.calibrate is not None:
+        calibration = Calibration.open(online.calibrate)
         print_calibration(calibration)
         print_warnings(Results.of(calibration.run))
     if recording.attrs["status"] == "aborted":
         reason = recording.attrs.get("reason") or "no reason given"
         raise Aborted(f"{recording.path}: the recording was aborted: {reason}")
-    calibrated = None if choice is None else choice.run
-    typer.echo("next: " + " or: ".join(next_commands(recording.path, calibrated)))
+    print_next(*next_commands(recording.path, online.calibrate))
 
 
 def next_commands(recording: Path, calibrated: Path | None) -> list[str]:
@@ -167,7 +153,6 @@ def execute(run: Path, how: ExecutionOptions) -> None:
     from ..inputs.rigs import rig_of
     from ..robot.pour import dry_pour, execute_pour
 
-    _one_of(how.arm, how.emulator)
     opened = rig_of(how.rig)
     if not (how.arm or how.emulator):
         _tell_dry(*dry_pour(run, opened))
@@ -181,17 +166,6 @@ def execute(run: Path, how: ExecutionOptions) -> None:
             despite_bad_fit=how.despite_bad_fit,
         )
     typer.echo(f"poured; what the arm did is in {done}")
-
-
-def _one_of(arm: bool, emulator: bool) -> None:
-    if arm and emulator:
-        raise typer.BadParameter("--arm moves a real arm, --emulator an emulated one: give one")
-
-
-def _needs(option: str, given: object, others: dict[str, object]) -> None:
-    for name, value in others.items():
-        if given is None and value is not None:
-            raise typer.BadParameter(f"{name} needs {option}, which is missing")
 
 
 def typed_sentence(plan: str) -> str:

@@ -45,22 +45,6 @@ class LiquidOptions:
             "seed": self.seed,
         }
 
-    def lines(self, simulated: "Dataset") -> list[str]:
-        """The liquid, for a person."""
-        import json
-
-        from ..inputs.described_liquid import Described
-
-        attrs = simulated.attrs
-        return Described(
-            self.viscosity,
-            self.cohesion,
-            float(attrs["liquid_density"]),
-            json.loads(attrs["effects"]),
-            int(attrs["particles"]),
-            self.seed,
-        ).lines()
-
 
 @dataclass(frozen=True)
 class FileOptions:
@@ -123,7 +107,7 @@ def stir(
             out=files.out,
         )
     seconds = float(made["time"][-1])
-    _tell([*liquid.lines(made), f"path of {made.attrs['path_of']}, {seconds:.1f} s"])
+    _tell(made, f"path of {made.attrs['path_of']}, {seconds:.1f} s")
     xz, yz = (
         np.degrees(np.abs(made[f"inclination_{plane}"]).max().item()) for plane in ("xz", "yz")
     )
@@ -167,14 +151,21 @@ def pour(
             movie=files.movie,
             out=files.out,
         )
-    turn = f"{action.angular_velocity:g} deg/s, lip to axis {action.distance:g} cm"
-    _tell([*liquid.lines(made), turn])
+    _tell(made, f"{action.angular_velocity:g} deg/s, lip to axis {action.distance:g} cm")
     typer.echo(", ".join(f"{name} {made[name].item():.1%}" for name in FRACTIONS))
     _tell_files(files)
 
 
-def _tell(lines: list[str]) -> None:
-    typer.echo("\n".join(lines))
+def _tell(made: "Dataset", how: str) -> None:
+    """The liquid that was simulated, and how."""
+    import json
+
+    from ..inputs.described_liquid import Described
+
+    names = ("viscosity", "cohesion", "liquid_density", "effects", "particles", "seed")
+    *numbers, effects, particles, seed = (made.attrs[name] for name in names)
+    liquid = Described(*map(float, numbers), json.loads(effects), int(particles), int(seed))
+    typer.echo("\n".join([*liquid.lines(), how]))
 
 
 def _tell_files(files: FileOptions) -> None:

@@ -1,4 +1,4 @@
-"""Light on and through the liquid: absorption, refraction and reflection."""
+"""Light on and through the liquid: absorption, scattering and reflection."""
 
 from typing import NamedTuple
 
@@ -14,8 +14,6 @@ Picture = NDArray[np.floating]
 ABSORPTION = np.array([62.0, 21.0, 7.0], np.float32)  # 1/m: a blue dye, so that depth is seen
 SCATTERED_COLOUR = np.array([0.36, 0.62, 0.86], np.float32)
 SCATTERING = 8.0  # 1/m
-REFRACTION_SHIFT = 0.35  # displacement of what is behind, by the thickness
-MAX_BENDING_DEPTH = 0.02  # m of liquid; more refracts no further
 SKY, GROUND = np.array([1.0, 1.0, 1.0], np.float32), np.array([0.62, 0.68, 0.74], np.float32)
 LAMP_DIRECTION = np.array([-0.45, 0.72, 0.53], np.float32)
 SHININESS = 60.0
@@ -48,15 +46,11 @@ def over(below: Picture, colour: Picture, cover: NDArray) -> Picture:
 
 
 def through_liquid(
-    view: OrthographicView,
-    behind: Picture,
-    liquid: VisibleSurface | None,
-    stick: Layer | None = None,
+    behind: Picture, liquid: VisibleSurface | None, stick: Layer | None = None
 ) -> Picture:
     """The picture with the liquid in it, and a stick that dips into it.
 
     Args:
-        view: The camera.
         behind: What is there besides.
         liquid: None if none is seen.
         stick: Seen through half of the liquid where it is behind the surface.
@@ -64,12 +58,11 @@ def through_liquid(
     base = behind if stick is None else over(behind, stick.colour, stick.cover)
     if liquid is None:
         return base
-    part, bent = liquid.window, _bent(view, liquid)
-    depth = liquid.thickness[..., None]
-    passed = behind[bent] * np.exp(-ABSORPTION * depth)
+    part, depth = liquid.window, liquid.thickness[..., None]
+    passed = behind[part] * np.exp(-ABSORPTION * depth)
     if stick is not None:
-        dyed = stick.colour[bent] * np.exp(-ABSORPTION * depth / 2.0)
-        passed = over(passed, dyed, stick.cover[bent])
+        dyed = stick.colour[part] * np.exp(-ABSORPTION * depth / 2.0)
+        passed = over(passed, dyed, stick.cover[part])
     passed += SCATTERED_COLOUR * (1.0 - np.exp(-SCATTERING * depth))
     picture = base.copy()
     lit = over(base[part], _lit(passed, liquid.normal), liquid.cover)
@@ -78,20 +71,6 @@ def through_liquid(
         lit = over(lit, stick.colour[part], nearer)
     picture[part] = lit
     return picture
-
-
-def _bent(view: OrthographicView, seen: VisibleSurface) -> tuple[NDArray, NDArray]:
-    """Row and column of what is seen through each pixel of the window: towards the thicker side."""
-    bend = (
-        REFRACTION_SHIFT * view.scale * np.minimum(seen.thickness, MAX_BENDING_DEPTH) * seen.cover
-    )
-    rows, columns = np.mgrid[seen.window]
-    moved = rows + bend * seen.normal[..., 1], columns - bend * seen.normal[..., 0]
-    row, column = (
-        np.rint(np.clip(at, 0, size - 1)).astype(int)
-        for at, size in zip(moved, (view.height, view.width), strict=True)
-    )
-    return row, column
 
 
 def _lit(passed: Picture, normal: NDArray) -> Picture:

@@ -5,25 +5,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter, map_coordinates
 
-from .landed_liquid import Landed, landed, level
-from .light import (
-    ABSORPTION,
-    SCATTERED_COLOUR,
-    SCATTERING,
-    Picture,
-    over,
-    through_liquid,
-)
-from .solids import (
-    Shape,
-    drawn,
-    glass_before,
-    glass_behind,
-    ring,
-    room,
-)
+from .landed_liquid import landed, level
+from .light import through_liquid
+from .solids import Shape, drawn, glass_before, glass_behind, ring, room
 from .surface import Glass, surface
 from .text import written
 from .view import OrthographicView
@@ -34,10 +19,9 @@ if TYPE_CHECKING:
 PICTURE_SIZE = 480, 640
 AZIMUTH, ELEVATION = np.radians(12.0), np.radians(14.0)
 PUDDLE_SPREAD = 0.012  # m that spilled liquid spreads
-TABLE_CELL = 0.002  # m
-DARKEST_DEPTH = 0.012  # m of liquid
+PUDDLE_CELL = 0.004  # m between places where liquid lies
 CAPTION_HEIGHT = 0.09  # share of the picture's height that is left free for the caption
-DYED, SHINING = (38, 92, 190, 215), (92, 160, 226, 235)
+DYED, SHINING, SPILLED = (38, 92, 190, 215), (92, 160, 226, 235), (70, 150, 235, 190)
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -94,10 +78,10 @@ def pour_pictures(
         below = landed(frames.landed, int(passed[last]), int(passed[at]), interval, cups, distance)
         source = source_glass(cups, float(angle))
         points = np.concatenate([position[: count - passed[at]], below.falling])
-        picture = with_puddle(view, empty, below, cups, count)
+        picture = drawn(view, empty, _puddle(below.spilled, cups))
         picture = drawn(view, picture, _filled(view, receiver, level(below.caught, cups)))
         picture = drawn(view, picture, glass_behind(source, view))
-        picture = through_liquid(view, picture, surface(view, points, spacing, source))
+        picture = through_liquid(picture, surface(view, points, spacing, source))
         for glass in (receiver, source):
             picture = drawn(view, picture, glass_before(glass, view))
         spilled = passed[at] / count - below.caught
@@ -117,33 +101,10 @@ def _filled(view: OrthographicView, receiver: Glass, depth: float) -> list[Shape
     return [*glass_behind(receiver, view), *liquid]
 
 
-def with_puddle(
-    view: OrthographicView, below: Picture, lying: Landed, cups: "Cups", count: int
-) -> Picture:
-    """What was spilled, as a film on the table of the volume that lies there."""
-    if not len(lying.spilled):
-        return below
-    centre, reach = (
-        lying.spilled.mean(axis=0),
-        np.ptp(lying.spilled, axis=0).max() + 8.0 * PUDDLE_SPREAD,
-    )
-    bins = max(int(reach / TABLE_CELL), 1)
-    edges = [np.linspace(c - reach / 2.0, c + reach / 2.0, bins + 1) for c in centre]
-    hits, _, _ = np.histogram2d(*lying.spilled.T, bins=edges)
-    volume = cups.liquid_volume / count / (reach / bins) ** 2
-    film = gaussian_filter(volume * hits, PUDDLE_SPREAD * bins / reach)
-
-    right, up = view.metres()
-    axes, table = view.axes, -cups.pour.lip_height - view.centre[2]
-    # the line of sight through each pixel, followed to the height of the table
-    toward = (table - up * axes[1, 2] - right * axes[0, 2]) / axes[2, 2]
-    x = view.centre[0] + right * axes[0, 0] + up * axes[1, 0] + toward * axes[2, 0]
-    y = view.centre[1] + right * axes[0, 1] + up * axes[1, 1] + toward * axes[2, 1]
-    places = [(p - edge[0]) / (reach / bins) - 0.5 for p, edge in zip((x, y), edges, strict=True)]
-    depth = map_coordinates(film, places, order=1)[..., None]
-    # light passes it to the table and back, and no colour is darker than that of a full cup
-    dyed = below * np.exp(
-        -2.0 * ABSORPTION * np.minimum(depth, DARKEST_DEPTH)
-    ) + SCATTERED_COLOUR * (1.0 - np.exp(-SCATTERING * depth))
-    edge = np.clip(depth[..., 0] / 3e-4, 0.0, 1.0)
-    return over(below, np.clip(dyed, 0.0, 1.0).astype(np.float32), edge.astype(np.float32))
+def _puddle(spilled: NDArray, cups: "Cups") -> list[Shape]:
+    """What lies on the table around places [n, 2]."""
+    centres = PUDDLE_CELL * np.unique(np.rint(spilled / PUDDLE_CELL), axis=0)
+    table = np.full(len(centres), -cups.pour.lip_height)
+    turn = np.linspace(0.0, 2.0 * np.pi, 25)
+    disc = PUDDLE_SPREAD * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
+    return [Shape(centre + disc, SPILLED) for centre in np.column_stack([centres, table])]

@@ -30,7 +30,9 @@ class Shape(NamedTuple):
 
 
 def drawn(view: OrthographicView, below: Picture, shapes: Sequence[Shape]) -> Picture:
-    """A picture with shapes over it, in their order."""
+    """A picture with shapes over it; each replaces what earlier ones have in its place."""
+    if not shapes:
+        return below
     places = [view.pixels(shape.points) for shape in shapes]
     part = window(view, np.concatenate(places), max(shape.width for shape in shapes))
     rows, columns = part
@@ -38,14 +40,13 @@ def drawn(view: OrthographicView, below: Picture, shapes: Sequence[Shape]) -> Pi
     finer = tuple(LINE_SUPERSAMPLING * pixels for pixels in size)
     corner = np.array([columns.start, rows.start]) - 0.5
     sheet = Image.new("RGBA", finer)
+    pen = ImageDraw.Draw(sheet)
     for place, shape in zip(places, shapes, strict=True):
         at = [tuple(p) for p in LINE_SUPERSAMPLING * (place - corner)]
-        own = Image.new("RGBA", finer, shape.colour[:3] + (0,)) if not shape.width else None
-        if own is None:
-            ImageDraw.Draw(sheet).line(at, fill=shape.colour, width=shape.width, joint="curve")
+        if shape.width:
+            pen.line(at, fill=shape.colour, width=shape.width, joint="curve")
         else:
-            ImageDraw.Draw(own).polygon(at, fill=shape.colour)
-            sheet = Image.alpha_composite(sheet, own)
+            pen.polygon(at, fill=shape.colour)
     # premultiplied, so that no colour of empty pixels bleeds into the edges
     small = np.asarray(sheet.convert("RGBa").reduce(LINE_SUPERSAMPLING), np.float32) / 255.0
     picture = below.copy()

@@ -7,13 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .light import through_liquid
-from .solids import (
-    drawn,
-    glass_before,
-    glass_behind,
-    room,
-    stick_layer,
-)
+from .solids import drawn, glass_before, glass_behind, room, stick_layer
 from .surface import Glass, surface
 from .text import written
 from .view import OrthographicView
@@ -54,7 +48,7 @@ def stir_pictures(
     ):
         stick = stick_layer(view, pivot, tip, setup.stick.radius)
         liquid = surface(view, position, setup.spacing, glass)
-        picture = drawn(view, through_liquid(view, empty, liquid, stick), before)
+        picture = drawn(view, through_liquid(empty, liquid, stick), before)
         angle = np.degrees(np.arctan2((tip - pivot)[:2], (pivot - tip)[2]))
         lines = [f"{time:.2f} s", f"stick {angle[0]:+.1f}° in xz, {angle[1]:+.1f}° in yz"]
         yield written(picture, lines, caption)

@@ -1,7 +1,7 @@
 """From particles to the surface of the liquid, as a camera sees it.
 
 All of it is computed in the picture's own pixels (van der Laan, Green and Sainz 2009): no grid in
-space, no mesh. It takes some 10 ms of processor time for a picture of 5000 particles.
+space, no mesh. A picture of 4000 particles, 640 pixels wide, takes 25 ms of processor time.
 """
 
 from dataclasses import dataclass
@@ -96,11 +96,8 @@ def surface(
     nearest, count = np.full(shape, -np.inf), np.zeros(shape)
     np.maximum.at(nearest, at, view.camera(clear[seen])[:, 2])
     np.add.at(count, at, 1.0)
-    away = distance_transform_edt(np.isinf(nearest)) / view.scale
-    whole = away < blown
-    # how far inside the blown-up liquid's edge each pixel is; beyond the picture it goes on
-    inwards = distance_transform_edt(np.pad(whole, 1, mode="edge"))[1:-1, 1:-1]
-    cover = np.clip(inwards - view.scale * shrunk, 0.0, 1.0)
+    whole = _distance_to(~np.isinf(nearest)) < view.scale * blown
+    cover = np.clip(_distance_to(~whole) - view.scale * shrunk, 0.0, 1.0)
     # a paraboloid on top of each particle, which two passes along the axes make
     bulge = -((np.arange(-reach, reach + 1) / view.scale) ** 2) / (2.0 * blown)
     for kernel in (bulge[:, None], bulge[None, :]):
@@ -112,6 +109,11 @@ def surface(
     together = spacing * pixels**2 * gaussian_filter(count, SMOOTHED * pixels)
     thickness = np.maximum(together, 2.0 * drop)
     return VisibleSurface(part, cover, front, normal, thickness)
+
+
+def _distance_to(some: NDArray) -> NDArray:
+    """Of each pixel to the nearest of some, in pixels."""
+    return np.asarray(distance_transform_edt(~some))
 
 
 def _smoothed(values: NDArray, known: NDArray, sd: float) -> NDArray:

@@ -19,7 +19,6 @@ from ..inference.criticism.verdict_kind import VerdictKind
 from ..models.numerics import TESTED_RATIO
 from ..pouring.draining import TENTH, Hold
 from ..pouring.result import ActionSummary, GivenPour, GivenSummary, Pour
-from ..pouring.spillage import ACTION
 from ..wording import (
     LEAST_SPILLED,
     LIQUID_UNITS,
@@ -61,12 +60,7 @@ MAX_LISTED = 3
 MUCH_SPILLED = 0.05
 """Expected spillage that a person would mop up."""
 
-ACTION_ENDS = {
-    ("angular_velocity", 0): "slowest",
-    ("angular_velocity", 1): "fastest",
-    ("distance", 0): "nearest",
-    ("distance", 1): "farthest",
-}
+ACTION_ENDS = {"angular_velocity": ("slowest", "fastest"), "distance": ("nearest", "farthest")}
 """What an action at either end of the range of each quantity is called."""
 
 NONE = "–"
@@ -168,20 +162,14 @@ def criticism_facts(criticism: Criticism) -> Facts:
     summary, tree = criticism.summary, criticism.tree
     stirs = tree.children["stirs"]
     effects = stirs["effects"].to_dataset()
-    snr, held = dict(_numbers(effects, "snr")), held_out_of(stirs)
+    snr, held = dict(_numbers(effects, "snr")), list(_held_out(held_out_of(stirs)))
     ranked = sorted(snr.items(), key=lambda item: -item[1])
     gap, where = summary.gap, [_place(window) for window in summary.where[:MAX_LISTED]]
     before = criticism.base.summary.parameters
     return {
+        **vars(summary),
         **verdict_facts(summary),
-        "requested": _spoken(summary.requested),
-        "unsupported": _spoken(summary.unsupported),
-        "accepted": _spoken(summary.accepted),
-        "considered": _spoken(summary.considered),
-        "untested": _spoken(summary.untested),
-        "baseline": summary.baseline,
-        "not_clean": summary.baseline_left_out,
-        "frame_faults": summary.frame_faults,
+        "considered": summary.considered,
         "coefficients": [_coefficient(*item) for item in summary.coefficient.items()],
         "refit": [
             {
@@ -199,25 +187,18 @@ def criticism_facts(criticism: Criticism) -> Facts:
         "detectable": {
             spoken(name): f"{ratio:.0f}" for name, ratio in ranked if ratio >= DETECTABLE_SNR
         },
-        "undetectable": _spoken(name for name, ratio in snr.items() if ratio < DETECTABLE_SNR),
+        "undetectable": [name for name, ratio in snr.items() if ratio < DETECTABLE_SNR],
         "detectable_from": f"{DETECTABLE_SNR:.0f}",
         "gains": _gains(effects),
-        "holds": {}
-        if held is None
-        else {spoken(str(one)): bool(held["holds"].sel(explanation=one)) for one in _names(held)},
-        "held_out": [] if held is None else list(_held_out(held)),
+        "holds": {one["explanation"]: one["holds"] for one in held},
+        "held_out": held,
         "effects": {
             name: list(_effects(tree.children[name]))
             for name in ("stirs", "pours")
             if name in tree.children
         },
         "suggestions": [
-            {
-                "experiment": one.experiment,
-                "between": _spoken(one.between),
-                "snr": f"{one.snr:.1f}",
-                "helps": one.snr >= DETECTABLE_SNR,
-            }
+            vars(one) | {"snr": f"{one.snr:.1f}", "helps": one.snr >= DETECTABLE_SNR}
             for one in sorted(summary.suggestions, key=lambda one: -one.snr)
         ],
         "noise": {
@@ -226,7 +207,6 @@ def criticism_facts(criticism: Criticism) -> Facts:
             "correlation": f"{summary.noise.correlation:.2f}",
             "samples": summary.noise.samples,
         },
-        "simulations": summary.n_simulations,
         "seconds": f"{summary.seconds:.0f}",
     }
 
@@ -267,11 +247,8 @@ def _coefficient(name: str, values: ParameterSummary) -> Facts:
     """How large an accepted effect is, and what it is."""
     from ..models import EFFECTS
 
-    effect = EFFECTS.get(name)
-    known = {"text": "", "neutral": ""}
-    if effect is not None:
-        known = {"text": effect.text, "neutral": with_unit(name, effect.neutral)}
-    return {**_parameter(name, values), **known}
+    neutral = with_unit(name, EFFECTS[name].neutral)
+    return {**_parameter(name, values), "text": EFFECTS[name].text, "neutral": neutral}
 
 
 def _place(window: DifferingWindow) -> Facts:
@@ -284,12 +261,11 @@ def _place(window: DifferingWindow) -> Facts:
 
 def _gains(effects: "Dataset") -> list[Facts]:
     """The effects that alone explain most, best first."""
-    p_values = dict(_numbers(effects, "p_value"))
-    ranked = sorted(_numbers(effects, "gain"), key=lambda item: -item[1])
+    helpful = effects.where(effects["gain"] > 0.0, drop=True).sortby("gain", ascending=False)
+    columns = (helpful[name].to_numpy()[:MAX_LISTED] for name in ("effect", "gain", "p_value"))
     return [
-        {"name": spoken(name), "gain": f"{gain:.1f}", "p": f"{p_values[name]:.2g}"}
-        for name, gain in ranked[:MAX_LISTED]
-        if gain > 0.0
+        {"name": spoken(str(name)), "gain": f"{gain:.1f}", "p": f"{p:.2g}"}
+        for name, gain, p in zip(*columns, strict=True)
     ]
 
 
@@ -298,9 +274,11 @@ def held_out_of(source: "DataTree") -> "Dataset | None":
     return source["held_out"].to_dataset() if "held_out" in source.children else None
 
 
-def _held_out(held: "Dataset") -> Iterator[Facts]:
+def _held_out(held: "Dataset | None") -> Iterator[Facts]:
     """Each explanation on each held-out recording."""
-    for name in _names(held):
+    if held is None:
+        return
+    for name in held["explanation"].to_numpy():
         for recording in held["recording"].to_numpy():
             gap = held.sel(explanation=name, recording=recording)
             angles = {key: float(np.degrees(gap[key])) for key in HELD_OUT_ANGLES}
@@ -423,9 +401,9 @@ def _ends(pour: "DataTree") -> list[str]:
     """The ends of what was allowed at which the chosen pour is; a better one may lie beyond."""
     actions, chosen = pour["actions"], pour["chosen"].attrs
     return [
-        ACTION_ENDS[name, end]
-        for name in ACTION
-        for end, limit in enumerate(actions[name].to_numpy()[[0, -1]])
+        end
+        for name, ends in ACTION_ENDS.items()
+        for end, limit in zip(ends, actions[name].to_numpy()[[0, -1]], strict=True)
         if np.isclose(chosen[name], limit)
     ]
 
@@ -436,10 +414,6 @@ def _numbers(effects: "Dataset", column: str) -> Iterator[tuple[str, float]]:
     for name, value in zip(names, values, strict=True):
         if np.isfinite(value):
             yield str(name), float(value)
-
-
-def _names(held: "Dataset") -> "NDArray[np.str_]":
-    return held["explanation"].to_numpy()
 
 
 def _spoken(names: Any) -> list[str]:

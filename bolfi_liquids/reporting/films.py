@@ -30,7 +30,6 @@ from ..wording import spoken, with_unit
 if TYPE_CHECKING:
     from ..calibration.result import Calibration
     from ..inference.simulations import Compute
-    from ..models import PourFrames, StirFrames
     from ..pouring.result import Pour
 
 N_DRAWS_SHOWN = 3
@@ -46,58 +45,27 @@ FILM_SHARE = 0.6
 """Of the size of a movie's pictures: three stand side by side."""
 
 
-class StirScene(NamedTuple):
-    """The stir of a recording, of any liquid."""
-
-    simulator: StirSimulator
-
-    name = "stir"
-
-    def frames(self, theta: dict[str, float], seed: int) -> "StirFrames":
-        """Simulate the stir of one liquid."""
-        return self.simulator.frames(theta, seed, FILM_RATE)
-
-    def pictures(self, frames: "StirFrames") -> Iterator[NDArray[np.uint8]]:
-        """Draw each frame."""
-        from ..movie.stir import stir_pictures
-
-        return stir_pictures(frames, self.simulator.setups[0], (), FILM_SHARE)
-
-
-class PourScene(NamedTuple):
-    """A pour at an angular velocity [rad/s] and a distance [m], of any liquid."""
-
-    simulator: PourSimulator
-    angular_velocity: float
-    distance: float
-
-    name = "pour"
-
-    def frames(self, theta: dict[str, float], seed: int) -> "PourFrames":
-        """Simulate the pour of one liquid."""
-        return self.simulator.frames(theta | {RATE: self.angular_velocity}, seed, FILM_RATE)
-
-    def pictures(self, frames: "PourFrames") -> Iterator[NDArray[np.uint8]]:
-        """Draw each frame."""
-        from ..movie.pour import pour_pictures
-
-        return pour_pictures(frames, self.simulator.cups, self.distance, (), FILM_SHARE)
-
-
 class Film(NamedTuple):
     """A film of a run.
 
     Attributes:
-        scene: What happens.
+        simulator: Of a stir or a pour.
         theta: Of the liquid: its parameters, and the coefficients of effects.
         seed: Of the packing.
+        action: Of a pour, as `choose_pour` names it.
         folder: Where it is kept.
     """
 
-    scene: StirScene | PourScene
+    simulator: StirSimulator | PourSimulator
     theta: dict[str, float]
     seed: int
+    action: dict[str, float]
     folder: Path
+
+    @property
+    def scene(self) -> str:
+        """What happens."""
+        return "pour" if self.action else "stir"
 
     @property
     def liquid(self) -> str:
@@ -110,11 +78,10 @@ class Film(NamedTuple):
         """Its file, in WebP; empty if the simulation diverges."""
         from ..models import MODEL_VERSION
 
-        simulator, *action = self.scene
-        simulated = [simulator.identity, action, self.theta, self.seed]
+        simulated = [self.simulator.identity, self.theta, self.seed, self.action]
         shown = json.dumps([MODEL_VERSION, FILM_RATE, FILM_SHARE, *simulated])
         digest = sha256(shown.encode()).hexdigest()[:12]
-        return self.folder / f"{self.scene.name}-{digest}.webp"
+        return self.folder / f"{self.scene}-{digest}.webp"
 
     @property
     def moving(self) -> str:
@@ -131,6 +98,26 @@ class Film(NamedTuple):
             film.seek(film.n_frames // 2)  # type: ignore[attr-defined]
             film.convert("RGB").save(picture, "WEBP", quality=85)
         return _url(picture.getvalue())
+
+    def pictures(self, timeout: float | None) -> Iterator[NDArray[np.uint8]] | None:
+        """Simulate it, and draw each frame; none if the simulation diverges.
+
+        Raises:
+            TimeoutError: The simulation took longer than the timeout.
+        """
+        from ..models import time_limit
+        from ..movie.pour import pour_pictures
+        from ..movie.stir import stir_pictures
+
+        rate = {RATE: self.action[RATE]} if self.action else {}
+        with nullcontext() if timeout is None else time_limit(timeout):
+            frames = self.simulator.frames(self.theta | rate, self.seed, FILM_RATE)
+        if np.isnan(frames.position[0]).all():
+            return None
+        if isinstance(self.simulator, StirSimulator):
+            return stir_pictures(frames, self.simulator.setups[0], (), FILM_SHARE)
+        cups, distance = self.simulator.cups, self.action["distance"]
+        return pour_pictures(frames, cups, distance, (), FILM_SHARE)
 
 
 def films_of(
@@ -153,19 +140,17 @@ def films_of(
     """
     settings, whole = calibration.record["settings"], calibration.run.recordings[0]
     start = whole.first(int(np.sum(whole.time - whole.time[0] <= MAX_STIR_SECONDS)))
-    scenes: list[Any] = [StirScene(stir_simulator([start], int(settings["particles"])))]
+    scenes: list[Any] = [(stir_simulator([start], int(settings["particles"])), {})]
     if pour is not None:
-        cups, action = kept_cups(json.loads(pour.tree.attrs["cups"])), pour.chosen
-        simulator = PourSimulator(cups, calibration.liquid_density, Parcels())
-        scenes.append(PourScene(simulator, action.angular_velocity, action.distance))
+        cups, density = kept_cups(json.loads(pour.tree.attrs["cups"])), calibration.liquid_density
+        scenes.append((PourSimulator(cups, density, Parcels()), pour.chosen.action))
     seed, folder = int(settings["seed"]), calibration.path / MOVING
     drawn = calibration.draws(N_DRAWS_SHOWN, seed)
     seeds = simulation_seeds(seed, Phase.MOVING_PICTURES, N_DRAWS_SHOWN)
-    thetas = [{name: float(of[at]) for name, of in drawn.items()} for at in range(len(seeds))]
     films = [
-        Film(scene, theta, int(own), folder)
-        for scene in scenes
-        for theta, own in zip(thetas, seeds, strict=True)
+        Film(simulator, {name: float(of[at]) for name, of in drawn.items()}, own, action, folder)
+        for simulator, action in scenes
+        for at, own in enumerate(seeds)
     ]
     folder.mkdir(exist_ok=True)
     missing = [film for film in films if not film.path.exists()]
@@ -193,18 +178,8 @@ def _made(films: list[Film], compute: "Compute") -> Iterator[bytes]:
 
 
 def _content(film: Film, timeout: float | None) -> bytes:
-    """A film in WebP; empty if the simulation diverges.
-
-    Raises:
-        TimeoutError: The simulation took longer than the timeout.
-    """
-    from ..models import time_limit
-
-    with nullcontext() if timeout is None else time_limit(timeout):
-        frames: Any = film.scene.frames(film.theta, film.seed)
-    if np.isnan(frames.position[0]).all():
-        return b""
-    return encoded(film.scene.pictures(frames), FILM_RATE)
+    pictures = film.pictures(timeout)
+    return b"" if pictures is None else encoded(pictures, FILM_RATE)
 
 
 def _url(content: bytes) -> str:

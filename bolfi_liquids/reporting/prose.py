@@ -3,9 +3,12 @@
 import re
 from collections.abc import Mapping
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..wording import listed
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 PARAGRAPHS = re.compile(r"\n\s*\n")
 
@@ -26,14 +29,20 @@ def prose(part: str, facts: Mapping[str, Any]) -> list[str]:
 
 @cache
 def _template() -> Any:
+    # not escaped: a page escapes whole paragraphs
+    return templates(autoescape=False).get_template("prose.jinja").module
+
+
+def templates(*, autoescape: bool) -> "Environment":
+    """The package's templates, in which a missing fact is an error."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
         loader=PackageLoader("bolfi_liquids", "data"),
-        autoescape=False,  # a page escapes whole paragraphs
+        autoescape=autoescape,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     environment.filters["listed"] = listed
-    return environment.get_template("prose.jinja").module
+    return environment

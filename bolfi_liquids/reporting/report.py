@@ -13,19 +13,18 @@ from ..criticism.figures import held_out_plot, pour_residual_plot, residual_plot
 from ..criticism.result import Criticism
 from ..drawing import styled, to_svg
 from ..files import write_text
-from ..inputs.settings import PourSettings
 from ..pouring.figures import pour_figure
 from ..run.compute import open_compute
 from ..run.run import REPORT, RUN_TOML, Run, RunOrPath
 from .facts import held_out_of
 from .films import films_of
-from .prose import prose
+from .prose import prose, templates
 from .warnings import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..inference.simulations import Compute, Workers
+    from ..inference.simulations import Workers
 
 PAGE_TEMPLATE, STYLE = "report.html.jinja", "report.css"
 
@@ -54,45 +53,28 @@ def report(
     with (
         Run.entered(run) as opened,
         open_compute(executor, timeout) as compute,
+        ThreadPoolExecutor(1) as thread,
     ):
-        return written(Results.of(opened), compute, moving=moving, progress=progress)
-
-
-def written(
-    results: Results, compute: "Compute", *, moving: bool = True, progress: bool = True
-) -> Path:
-    """Write RUN/report.html from given results.
-
-    Args:
-        results: What the run holds.
-        compute: Where moving pictures are simulated.
-        moving, progress: See `report`.
-    """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("bolfi_liquids", "data"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    facts = results.facts
-    with ThreadPoolExecutor(1) as thread:
+        results = Results.of(opened)
+        facts = results.facts
         drawn = thread.submit(figures_of, results)  # while this thread, or workers, make films
-        films = films_of(results.latest, results.pour, compute, progress=progress) if moving else []
-        figures = drawn.result()
-    page = environment.get_template(PAGE_TEMPLATE).render(
-        **facts,
-        prose=partial(prose, facts=facts),
-        figures=figures,
-        films=[film for film in films if film.path.stat().st_size],  # else it diverged
-        made_from=_made_from(results),
-        style=(files("bolfi_liquids.data") / STYLE).read_text(encoding="utf-8"),
-        record=results.calibration.record,
-        run=results.calibration.path,
-    )
-    return write_text(results.calibration.path / REPORT, page)
+        latest, pour = results.latest, results.pour
+        films = films_of(latest, pour, compute, progress=progress) if moving else []
+        page = (
+            templates(autoescape=True)
+            .get_template(PAGE_TEMPLATE)
+            .render(
+                **facts,
+                prose=partial(prose, facts=facts),
+                figures=drawn.result(),
+                films=[film for film in films if film.path.stat().st_size],  # else it diverged
+                made_from=_made_from(results),
+                style=(files("bolfi_liquids.data") / STYLE).read_text(encoding="utf-8"),
+                record=opened.record,
+                run=opened.path,
+            )
+        )
+        return write_text(opened.path / REPORT, page)
 
 
 def figures_of(results: Results) -> dict[str, str]:
@@ -133,11 +115,7 @@ def _made_from(results: Results) -> dict[str, str]:
     """The texts of run.toml, and of what criticism and pour were made from."""
     run = results.calibration.run
     made = {RUN_TOML: (run.path / RUN_TOML).read_text(encoding="utf-8")}
-    if results.criticism is not None:
-        made["criticism"] = json.dumps(results.criticism.made_from, indent=1)
-    if results.pour is not None:
-        attrs = results.pour.tree.attrs
-        settings = {name: attrs[name] for name in PourSettings.__dataclass_fields__}
-        cups = {"cups": json.loads(attrs["cups"])}
-        made["pour"] = json.dumps(settings | cups, indent=1, default=lambda number: number.item())
+    for name, result in (("criticism", results.criticism), ("pour", results.pour)):
+        if result is not None:
+            made[name] = json.dumps(json.loads(result.tree.attrs["made_from"]), indent=1)
     return made

@@ -17,15 +17,13 @@ class Results:
     Attributes:
         calibration: Without what a criticism accepted.
         criticism, pour: None where there is none of the latest posterior.
-        outdated: Why a criticism or a pour that is there does not count.
-        remedies: The command that makes each of these again.
+        outdated: Why a criticism or a pour that is there does not count, and what makes it again.
     """
 
     calibration: Calibration
     criticism: Criticism | None
     pour: Pour | None
     outdated: tuple[str, ...] = ()
-    remedies: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, run: Run) -> "Results":
@@ -34,11 +32,12 @@ class Results:
         Raises:
             InputError: There is no finished calibration.
         """
-        calibration = Calibration.of(run)
-        old = {step: why for step in ("criticise", "pour") if (why := run.why_not(step))}
-        remedies = tuple(map(run.again, old))
-        found = Criticism.of(run), Pour.of(run)
-        return cls(calibration, *found, tuple(old.values()), remedies)
+        outdated = tuple(
+            f"{why}; make it again: {run.again(step)}"
+            for step in ("criticise", "pour")
+            if (why := run.why_not(step))
+        )
+        return cls(Calibration.of(run), Criticism.of(run), Pour.of(run), outdated)
 
     @property
     def latest(self) -> Calibration:
@@ -48,13 +47,12 @@ class Results:
     @property
     def facts(self) -> Facts:
         """All chapters of `reporting.facts`; None where there is no such result."""
-        outdated = zip(self.outdated, self.remedies, strict=True)
         return {
             "calibration": calibration_facts(self.calibration),
             "latest": fit_facts(self.latest.summary),
             "criticism": self.criticism and criticism_facts(self.criticism),
             "pour": self.pour and pour_facts(self.pour),
-            "outdated": [{"why": why, "remedy": remedy} for why, remedy in outdated],
+            "outdated": self.outdated,
         }
 
 

@@ -9,7 +9,7 @@ import xarray as xr
 from distributed import LocalCluster
 
 import bolfi_liquids as bl
-from bolfi_liquids.cli.compute import open_executor_of
+from bolfi_liquids.cli.compute import ComputeOptions
 from bolfi_liquids.inputs.bundled import bundled_recording
 
 SETTINGS = {"budget": 9, "batch": 3, "particles": 1000, "chains": 2, "draws": 50, "seed": 5}
@@ -37,8 +37,8 @@ def recording(tmp_path_factory):
 @contextmanager
 def executor_of(where, address):
     workers, dask = {"here": (1, None), "processes": (2, None), "dask": (1, address)}[where]
-    with open_executor_of(workers, dask) as executor:
-        yield {"executor": executor, "timeout": 300.0, "progress": False}
+    with ComputeOptions(workers, dask, timeout=300.0).arguments() as where:
+        yield {**where, "progress": False}
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from bolfi_liquids.cli.app import app
-from bolfi_liquids.cli.compute import ComputeOptions, open_executor_of
+from bolfi_liquids.cli.compute import ComputeOptions
 from bolfi_liquids.cli.grouped import grouped
 
 ELSEWHERE = {"import", "guide", "record", "trim"}
@@ -46,7 +46,7 @@ def test_one_worker_is_this_process():
 
 def test_two_places_at_once_are_refused():
     with pytest.raises(typer.BadParameter, match="--workers and --dask"):
-        with open_executor_of(2, "tcp://127.0.0.1:9"):
+        with ComputeOptions(2, "tcp://127.0.0.1:9").opened():
             pass
 
 

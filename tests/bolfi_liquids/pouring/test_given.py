@@ -169,7 +169,7 @@ def test_pours_beyond_every_action_are_refused(chosen, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--pours", "64"], ("--given", "--budget")),
+        (["--pours", "64"], ("--pours",)),
         (["--liquid", "oil"], ("--liquid needs --given",)),
         (["--given", "missing.csv"], ("missing.csv",)),
     ],

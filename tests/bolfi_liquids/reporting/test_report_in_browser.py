@@ -107,10 +107,10 @@ def test_films_show_all_of_the_stir_and_the_pour(films, calibration):
     for film in films:
         with Image.open(film.path) as pictures:
             assert pictures.n_frames > 1
-            if film.scene.name == "stir":
+            if film.scene == "stir":
                 assert pictures.n_frames == pytest.approx(FILM_RATE * shown, abs=2)
     names = ["stir"] * N_DRAWS_SHOWN + ["pour"] * N_DRAWS_SHOWN
-    assert [film.scene.name for film in films] == names
+    assert [film.scene for film in films] == names
     drawn = calibration.draws(N_DRAWS_SHOWN, int(calibration.record["settings"]["seed"]))
     for film, viscosity in zip(films, 2 * drawn["viscosity"].tolist(), strict=True):
         assert f"{viscosity:.3g} Pa s" in film.liquid

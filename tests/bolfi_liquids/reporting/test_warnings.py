@@ -177,8 +177,8 @@ def test_a_pour_that_contradicts_the_simulator_is_said(warned):
 
 
 def test_what_does_not_count_any_more_is_said_with_its_remedy(warned):
-    outdated = {"outdated": ("pour.nc is older",), "remedies": ("bolfi-liquids pour RUN",)}
-    (warning,) = warned(pour=None, **outdated)
+    outdated = ("pour.nc is older; make it again: bolfi-liquids pour RUN",)
+    (warning,) = warned(pour=None, outdated=outdated)
     assert "pour.nc is older" in warning and "bolfi-liquids pour RUN" in warning
 
 

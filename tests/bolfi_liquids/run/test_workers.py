@@ -13,7 +13,7 @@ import pytest
 from distributed import LocalCluster
 
 import bolfi_liquids as bl
-from bolfi_liquids.cli.compute import open_executor_of
+from bolfi_liquids.cli.compute import ComputeOptions
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.run.compute import open_compute
 from bolfi_liquids.run.workers import background_process, processes
@@ -149,7 +149,7 @@ def test_workers_of_dask_have_one_thread_each(threads):
                 pass
         if threads > 1:
             with pytest.raises(ValueError, match="--nthreads 1"):
-                with open_executor_of(1, cluster.scheduler_address):
+                with ComputeOptions(1, cluster.scheduler_address).opened():
                     pass
 
 
