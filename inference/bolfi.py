@@ -125,27 +125,22 @@ class Bolfi(Displayed):
     @property
     def told(self) -> int:
         """Simulations told so far, failed ones included."""
-        return len(self._state.history.theta)
+        return len(self.history.theta)
 
     @property
     def succeeded(self) -> int:
         """Simulations told so far that gave a finite discrepancy, copies counted once."""
-        return int(self._state.history.distinct.sum())
+        return int(self.history.distinct.sum())
 
     @property
-    def errors(self) -> list[str]:
-        """Why simulations failed, in the order told."""
-        return [str(failure) for failure in self._state.history.why if failure is not None]
-
-    @property
-    def signal_shape(self) -> tuple[int, ...]:
-        """Shape of one simulated signal: that of `observed`, or of most signals told so far."""
-        return self._state.history.signal_shape
+    def history(self) -> History:
+        """Simulations told so far."""
+        return self._state.history
 
     @property
     def expected_shape(self) -> tuple[int, ...] | None:
-        """`signal_shape`; None where a user's discrepancy or summary takes signals of any shape."""
-        return None if self.family.any_shape else self.signal_shape
+        """Of a signal; None where a user's discrepancy or summary takes signals of any shape."""
+        return None if self.family.any_shape else self.history.signal_shape
 
     def ask(self, n: int = 1) -> dict[str, np.ndarray]:
         """The next n different points to simulate, name -> [n].
@@ -184,7 +179,7 @@ class Bolfi(Displayed):
             ValueError: bad argument.
         """
         n = checked_integer("n", n, 1, MOST_SIMULATIONS)
-        if not isinstance(fit, Fit) or fit.history is not self._state.history:
+        if not isinstance(fit, Fit) or fit.history is not self.history:
             raise ValueError(f"fit must be what `fit` returned last, got {fit!r:.100}")
         started = time.perf_counter()
         drawn = fit.population.resample(np.random.default_rng([self.seed, self.asked]), n)
@@ -204,11 +199,10 @@ class Bolfi(Displayed):
     @in_float64
     def _acquired(self, n: int, designed: np.ndarray) -> np.ndarray:
         """theta [n, d] of the engine's choice, `designed` [m, d] being asked with them."""
-        history = self._state.history
         pending = np.concatenate([self._state.pending, designed])
         key = self._key()
         self._learned = self.family.search(self._training_data(), key, self._learned)
-        repeated = next_replicate(history, pending) if self.family.replicates else None
+        repeated = next_replicate(self.history, pending) if self.family.replicates else None
         parts = [] if repeated is None else [repeated[None]]
         if n > len(parts):
             fantasized = self._learned.fantasize(self.prior.to_unit(self.prior.to_dict(pending)))
@@ -225,12 +219,10 @@ class Bolfi(Displayed):
     @property
     def _training_mask(self) -> np.ndarray:
         """Which runs are learned from, bool [n]: no copies, nor what blew up."""
-        history = self._state.history
-        return history.distinct & ~is_outlier(history.discrepancy)
+        return self.history.distinct & ~is_outlier(self.history.discrepancy)
 
     def _training_data(self) -> TrainingData:
-        history = self._state.history
-        good = self._training_mask
+        history, good = self.history, self._training_mask
         known = self.observed, history.u[good], history.features[good], history.discrepancy[good]
         # runs that blew up did not succeed
         succeeded = history.succeeded & ~is_outlier(history.discrepancy)
@@ -306,7 +298,7 @@ class Bolfi(Displayed):
             return
         failed = [
             failure
-            for failure in (*self._state.history.why, *measured.errors)
+            for failure in (*self.history.why, *measured.errors)
             if failure is not None and failure.kind is FailureKind.INCOMPARABLE
         ]
         if len(failed) >= BATCH:
@@ -358,19 +350,17 @@ class Bolfi(Displayed):
         check_flag("warn", warn)
         stacklevel = checked_integer("stacklevel", stacklevel)
         if self.succeeded < MIN_LEARN:
-            last = f"; the last error: {self.errors[-1]}" if self.errors else ""
             raise ValueError(
                 f"a fit needs {MIN_LEARN} successful simulations, got {self.succeeded} of "
-                f"{self.told} told; tell more{last}"
+                f"{self.told} told; tell more; the last error: {self.history.last_error}"
             )
         started = time.perf_counter()
-        known, history = self._training_data(), self._state.history
-        fitted = in_float64(self.family.learn)(known, self._key())
+        fitted = in_float64(self.family.learn)(self._training_data(), self._key())
         self._seconds += time.perf_counter() - started
         made = Fit(
             prior=self.prior,
             observed=self.observed,
-            history=history,
+            history=self.history,
             learned=fitted,
             training_mask=self._training_mask,
             settings=self.settings,

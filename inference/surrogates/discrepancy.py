@@ -189,13 +189,14 @@ def learn(
     transform: str | None = None,
     previous: DiscrepancySurrogate | None = None,
     normal: np.ndarray | None = None,
+    rule: Threshold = None,
 ) -> DiscrepancySurrogate:
     """Fit the surrogate.
 
     A run that blew up is learned as the worst of the others: the process need not follow it, but
     shall know that it is bad there. Of the transforms identity, sqrt and log the one with the
     highest leave-one-out log predictive density of the discrepancy itself (Jacobian included)
-    is taken, unless given. The threshold is that of the default rule, see `with_threshold`.
+    is taken, unless given.
 
     Args:
         u: Prior quantiles [n, d].
@@ -204,20 +205,17 @@ def learn(
         previous: Learned from the first of these data; its hyperparameters are kept until the
             data have grown by GROWTH, its transform until they have by TRANSFORM_GROWTH.
         normal: Which parameters the kernel sees as normal scores [d], see `gp.process.coordinates`.
+        rule: See `with_threshold`.
 
     Raises:
-        ValueError: bad transform.
+        ValueError: bad transform, or undefined at the given threshold.
     """
     values = np.minimum(discrepancy, discrepancy[~is_outlier(discrepancy)].max())
     n = len(u)
     with np.errstate(divide="ignore", invalid="ignore"):  # where the transform is undefined
-        old = previous is not None and np.isfinite(previous.scale(values)).all()
-    if (
-        previous is not None
-        and old
-        and not previous.equal
-        and n < TRANSFORM_GROWTH * previous.chosen_at
-    ):
+        known = previous is not None and not previous.equal
+        old = known and np.isfinite(previous.scale(values)).all()
+    if previous is not None and old and n < TRANSFORM_GROWTH * previous.chosen_at:
         data = Data(u, previous.scale(values)[None], normal)
         hyper, learned_at = previous.gp.hyper, previous.learned_at
         if n >= GROWTH * learned_at:
@@ -225,13 +223,14 @@ def learn(
         learned = DiscrepancySurrogate(
             condition(hyper, data), previous.scale, values, np.nan, learned_at, previous.chosen_at
         )
-        return with_threshold(learned, None)
+        return with_threshold(learned, rule)
     options = [_standardise(option, values) for option in candidates(transform, values)]
-    fitted = [_fit(Data(u, scale(values)[None], normal)) for scale in options]
+    every = [Data(u, scale(values)[None], normal) for scale in options]
+    fitted = [condition(maximum_a_posteriori(data), data) for data in every]
     scores = [_score(gp, scale, values) for gp, scale in zip(fitted, options, strict=True)]
     best = int(np.argmax(scores))
     chosen = DiscrepancySurrogate(fitted[best], options[best], values, np.nan, n, n)
-    return with_threshold(chosen, None)
+    return with_threshold(chosen, rule)
 
 
 def is_outlier(discrepancy: np.ndarray) -> np.ndarray:
@@ -241,10 +240,6 @@ def is_outlier(discrepancy: np.ndarray) -> np.ndarray:
     finite = deviation[np.isfinite(deviation)]
     spread = np.quantile(finite, BEST_SHARE) if finite.size else 0.0
     return (deviation / MAX_DEVIATIONS > spread) & (spread != 0.0)
-
-
-def _fit(data: Data) -> GP:
-    return condition(maximum_a_posteriori(data), data)
 
 
 def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> DiscrepancySurrogate:
@@ -362,9 +357,8 @@ class DiscrepancyFamily(Family):
     def _learn(
         self, data: TrainingData, previous: DiscrepancySurrogate | None, rule: Threshold
     ) -> DiscrepancySurrogate:
-        learned = learn(data.u, data.discrepancy, self.transform, previous, data.normal)
-        learned = replace(learned, success=learn_success(data.runs, data.normal))
-        return learned if rule is None else with_threshold(learned, rule)
+        learned = learn(data.u, data.discrepancy, self.transform, previous, data.normal, rule)
+        return replace(learned, success=learn_success(data.runs, data.normal))
 
     def _rule(self, data: TrainingData, number: Callable[[np.ndarray], float]) -> Threshold:
         """The threshold that was given, or the one that fits the residual of the closest run."""

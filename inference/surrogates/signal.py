@@ -31,7 +31,7 @@ from .emulator import (
     resized,
     smallest_misfit,
 )
-from .given_noise import Covariance, GivenNoise, NoiseModel, check_noise, given_noise
+from .given_noise import Covariance, GivenNoise, check_noise, given_noise
 from .measurement_noise import (
     CORRELATIONS,
     FEW_CORRELATIONS,
@@ -136,8 +136,7 @@ class SignalSurrogate(OfProcesses):
             remainder = Remainder(np.sqrt(share) * factors, share * white)
             noise = share * self.emulator.noise
             emulator = self.emulator._replace(noise=noise, remainder=remainder)
-            known = NoiseModel(self.known, 0.0)
-            found = observe(emulator, self.output, self.observed, known, previous=self)
+            found = observe(emulator, self.output, self.observed, self.known, 0.0, self)
             found = replace(found, box=self.box, success=self.success)
         return found.log_likelihood._replace(doubt=np.zeros(()))
 
@@ -310,7 +309,8 @@ def observe(
     emulator: Emulator,
     output: Output,
     observed: np.ndarray,
-    noise: NoiseModel,
+    given: GivenNoise | None,
+    misfit: float,
     previous: SignalSurrogate | None = None,
 ) -> SignalSurrogate:
     """Compare with the observed values [m].
@@ -320,18 +320,19 @@ def observe(
     nothing would explain what no run explains.
 
     Args:
-        noise: What is known of it.
+        given: The measurement noise; None where it is unknown.
+        misfit: Prior probability that the data are missed by more than it explains; 0 for none.
         previous: Its nodes are kept.
     """
     basis, remainder = emulator.basis, emulator.remainder
-    target, given = basis.standardise(observed), noise.given
+    target = basis.standardise(observed)
     vectors, factors = basis.vectors, remainder.factors
     white = np.full(len(target), remainder.white)
     if given is not None:
         white = white + given.white / basis.scale**2
         factors = np.column_stack([factors, given.factors / basis.scale[:, None]])
     kept = None if previous is None else (previous.nodes, previous.log_prior)
-    nodes, log_weight = kept or _nodes(emulator, output, observed, noise)
+    nodes, log_weight = kept or _nodes(emulator, output, observed, given, misfit)
     if emulator.equal:  # nothing to compare
         reduced = Reduced(*(np.zeros((len(log_weight), *[0] * axes)) for axes in (1, 2, 0, 0, 0)))
     else:
@@ -350,18 +351,22 @@ def observe(
 
 
 def _nodes(
-    emulator: Emulator, output: Output, observed: np.ndarray, noise: NoiseModel
+    emulator: Emulator,
+    output: Output,
+    observed: np.ndarray,
+    given: GivenNoise | None,
+    misfit: float,
 ) -> tuple[Nodes, np.ndarray]:
     """Sizes and correlations that the unknown noise or misfit may have, and their log weights."""
-    if emulator.equal or (noise.given is not None and not noise.misfit):
+    if emulator.equal or (given is not None and not misfit):
         return NO_MEASUREMENT_NOISE, np.zeros(1)
     basis = emulator.basis
     correlations = FEW_CORRELATIONS if output.series else NO_CORRELATION
     miss = smallest_misfit(emulator, observed, _screen(emulator, MISFIT_POINTS))
     low, high = LEAST_OF_MISFIT * miss, MOST_OF_NOISE * miss
-    if noise.given is not None:
-        sd = float(np.sqrt(np.mean(noise.given.variance / basis.scale**2)))
-        return with_misfit(candidates(low, MOST * miss, correlations), sd, noise.misfit)
+    if given is not None:
+        sd = float(np.sqrt(np.mean(given.variance / basis.scale**2)))
+        return with_misfit(candidates(low, MOST * miss, correlations), sd, misfit)
     if output.long:
         left = residual_size(basis.standardise(observed), basis.vectors[:, : basis.used])
         low, high, correlations = LEAST_OF_RESIDUAL * left, MOST * max(left, miss), CORRELATIONS
@@ -520,8 +525,7 @@ class SignalFamily(Family):
         def compared(at: np.ndarray | None) -> SignalSurrogate:
             """With what was observed, its noise being right around the features `at` [m]."""
             seen, given = scale.seen(at)
-            noise = NoiseModel(given, self.misfit)
-            found = observe(emulator, output, seen, noise, previous)
+            found = observe(emulator, output, seen, given, self.misfit, previous)
             return replace(found, success=success, scale=scale)
 
         found = compared(None)
