@@ -83,6 +83,7 @@ class Bolfi(Displayed):
         self.prior = prior
         self.family = resolve(surrogate, options)
         self.observed = self.family.observe(observed)
+        self._view = self.family.view(self.observed)
         self.seed = checked_integer("seed", seed, 0)
         self.initial = checked_integer(
             "initial",
@@ -92,13 +93,13 @@ class Bolfi(Displayed):
         )
         self._acquire = resolve_acquisition(acquisition, self.family.name, self.family.acquisition)
         self.settings: dict[str, object] = {
-            "surrogate": self.family.name,
+            "surrogate": self.family.name or type(self.family).__name__,
             **{name: describe(value) for name, value in vars(self.family).items()},
             "acquisition": describe(self._acquire),
             "seed": self.seed,
             "initial": self.initial,
         }
-        features = self.family.measure(self.observed, []).features
+        features = self.family.measure(self._view, []).features
         self._state = init(len(prior), self.observed.shape, features)
         self._learned: Any = None  # the family's surrogate, once there is one
         self._before: Before | None = None  # the posterior of which `confirm` drew
@@ -200,21 +201,21 @@ class Bolfi(Displayed):
     def _acquired(self, n: int, designed: np.ndarray) -> np.ndarray:
         """theta [n, d] of the engine's choice, `designed` [m, d] being asked with them."""
         pending = np.concatenate([self._state.pending, designed])
-        key = self._key()
-        self._learned = self.family.search(self._training_data(), key, self._learned)
+        words = self._words()
+        self._learned = self.family.search(self._training_data(), words, self._learned)
         repeated = next_replicate(self.history, pending) if self.family.replicates else None
         parts = [] if repeated is None else [repeated[None]]
         if n > len(parts):
+            key = jax.random.wrap_key_data(jax.device_put(words), impl="threefry2x32")
             fantasized = self._learned.fantasize(self.prior.to_unit(self.prior.to_dict(pending)))
             shape = n - len(parts), len(self.prior)
             u = chosen(self._acquire(key, fantasized, shape[0]), shape)
             parts.append(self.prior.to_array(self.prior.from_unit(u)))
         return np.concatenate(parts)
 
-    def _key(self) -> jax.Array:
-        """Made by NumPy: JAX would compile for half a second."""
-        words = np.random.SeedSequence([self.seed, self._state.asked]).generate_state(2)
-        return jax.random.wrap_key_data(jax.device_put(words), impl="threefry2x32")
+    def _words(self) -> np.ndarray:
+        """A key of JAX as NumPy makes it: JAX would compile for half a second."""
+        return np.random.SeedSequence([self.seed, self._state.asked]).generate_state(2)
 
     @property
     def _training_mask(self) -> np.ndarray:
@@ -223,7 +224,7 @@ class Bolfi(Displayed):
 
     def _training_data(self) -> TrainingData:
         history, good = self.history, self._training_mask
-        known = self.observed, history.u[good], history.features[good], history.discrepancy[good]
+        known = self._view, history.u[good], history.features[good], history.discrepancy[good]
         # runs that blew up did not succeed
         succeeded = history.succeeded & ~is_outlier(history.discrepancy)
         return TrainingData(*known, self.prior.normal, RunOutcomes(history.u, succeeded))
@@ -256,12 +257,16 @@ class Bolfi(Displayed):
         """
         started = time.perf_counter()
         natural = np.atleast_2d(self.prior.to_array(theta))
-        self._check_number(len(natural))
+        if self.told + len(natural) > MOST_SIMULATIONS:
+            raise ValueError(
+                f"theta holds {len(natural)} simulations beside the {self.told} told before; a run "
+                f"may have {MOST_SIMULATIONS} in all: leave the least useful out"
+            )
         rows = self.prior.to_dict(natural)
         told_rows, faults = self._signals(len(natural), signals)
         check_support(self.prior, rows)
         given_seeds = told_seeds(seeds, len(natural))
-        measured = self.family.measure(self.observed, told_rows)
+        measured = self.family.measure(self._view, told_rows)
         measured = _located(measured, rows, given_seeds)
         given_errors = told_errors(errors, np.isfinite(measured.discrepancy))
         self._check_compared(measured)
@@ -279,14 +284,6 @@ class Bolfi(Displayed):
         )
         self._state = remember_told(self._state, told)
         self._seconds += time.perf_counter() - started
-
-    def _check_number(self, n: int) -> None:
-        """Raise ValueError if n more simulations are more than one run may have."""
-        if self.told + n > MOST_SIMULATIONS:
-            raise ValueError(
-                f"theta holds {n} simulations beside the {self.told} told before; a run may have "
-                f"{MOST_SIMULATIONS} in all: leave the least useful out"
-            )
 
     def _check_compared(self, measured: Measured) -> None:
         """Raise ValueError if the user's own function failed on all of the first signals.
@@ -355,7 +352,7 @@ class Bolfi(Displayed):
                 f"{self.told} told; tell more; the last error: {self.history.last_error}"
             )
         started = time.perf_counter()
-        fitted = in_float64(self.family.learn)(self._training_data(), self._key())
+        fitted = in_float64(self.family.learn)(self._training_data(), self._words())
         self._seconds += time.perf_counter() - started
         made = Fit(
             prior=self.prior,

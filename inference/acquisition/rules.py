@@ -25,15 +25,10 @@ MIN_EFFECTIVE = 32.0  # candidates that count, effectively
 MIN_POWER = 1e-6
 
 
-def exploration_width(t: int, dimension: int, epsilon: float = 0.1) -> float:
-    """eta_t, eta_t^2 = 2 log(t^(d/2 + 2) pi^2 / (3 epsilon)) (Gutmann and Corander 2016).
-
-    Args:
-        t: Simulations so far, at least 1.
-        dimension: d.
-        epsilon: eps_eta, 0.1 in the paper.
-    """
-    return float(np.sqrt(2.0 * np.log(t ** (dimension / 2 + 2) * np.pi**2 / (3.0 * epsilon))))
+def exploration_width(t: int, dimension: int) -> float:
+    """eta_t, eta_t^2 = 2 log(t^(d/2 + 2) pi^2 / (3 eps_eta)), eps_eta = 0.1, after t simulations
+    (Gutmann and Corander 2016)."""
+    return float(np.sqrt(2.0 * np.log(t ** (dimension / 2 + 2) * np.pi**2 / (3.0 * 0.1))))
 
 
 @dataclass(frozen=True)

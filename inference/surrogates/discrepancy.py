@@ -4,9 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
-import jax
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..arguments import check_callable
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
@@ -306,6 +304,7 @@ class DiscrepancyFamily(Family):
             `threshold.choose_threshold`.
     """
 
+    name: ClassVar[str] = "discrepancy"
     acquisition: ClassVar[str] = "cautious"
 
     discrepancy: Discrepancy | None = None
@@ -318,18 +317,13 @@ class DiscrepancyFamily(Family):
         check_transform(self.transform)
 
     @property
-    def name(self) -> str:
-        return "discrepancy"
-
-    @property
     def any_shape(self) -> bool:
         return self.discrepancy is not None
 
-    def observe(self, observed: ArrayLike | None) -> np.ndarray:
-        array = super().observe(observed)
+    def view(self, observed: np.ndarray) -> np.ndarray:
         if self.discrepancy is None:
-            squared_difference()(array, array)  # raises if it cannot be used
-        return array
+            squared_difference()(observed, observed)  # raises if it cannot be used
+        return observed
 
     def measure(self, observed: np.ndarray, signals: Sequence[np.ndarray | None]) -> Measured:
         """Features are the signal, NaN where it has another shape than what was observed."""
@@ -338,12 +332,12 @@ class DiscrepancyFamily(Family):
         return Measured(features, *evaluate(distance, observed, signals))
 
     def search(
-        self, data: TrainingData, key: jax.Array, previous: DiscrepancySurrogate | None
+        self, data: TrainingData, key: np.ndarray, previous: DiscrepancySurrogate | None
     ) -> DiscrepancySurrogate:
         """Errors count as independent, lest a poor start leave it undecided."""
         return self._learn(data, previous, self._rule(data, numbers))
 
-    def learn(self, data: TrainingData, key: jax.Array) -> DiscrepancySurrogate:
+    def learn(self, data: TrainingData, key: np.ndarray) -> DiscrepancySurrogate:
         rule = self._rule(data, independent)
         said = () if rule is not None else (GUESSED,)
         if self.threshold is None and data.discrepancy.min() < 0.0:

@@ -2,9 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
-import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -401,6 +400,14 @@ def _screen(emulator: Emulator, count: int) -> np.ndarray:
     return np.concatenate([sobol(0, 0, count, data.shape[1]), data])
 
 
+class ObservedOutput(NamedTuple):
+    """What was observed, how outputs become values, and on which scale these are emulated."""
+
+    observed: np.ndarray  # [*signal_shape]
+    output: Output
+    scale: OutputScale
+
+
 @dataclass(frozen=True, eq=False)
 class SignalFamily(Family):
     """Principal components of the output, a Gaussian process for each score.
@@ -428,6 +435,7 @@ class SignalFamily(Family):
             blew up.
     """
 
+    name: ClassVar[str] = "signal"
     replicates: ClassVar[bool] = True
 
     summary: Summary | None = None
@@ -451,33 +459,23 @@ class SignalFamily(Family):
             checked_number("predicted", self.predicted, lambda share: 0.0 <= share < 1.0, due)
 
     @property
-    def name(self) -> str:
-        return "signal"
-
-    @property
     def any_shape(self) -> bool:
         return self.summary is not None
 
-    def observe(self, observed: ArrayLike | None) -> np.ndarray:
-        array = super().observe(observed)
-        self.view(array)  # raises if it cannot be used
-        return array
-
-    def view(self, observed: np.ndarray) -> tuple[Output, OutputScale]:
-        """How outputs become values, and the scale on which those are emulated."""
+    def view(self, observed: np.ndarray) -> ObservedOutput:
         output = describe(observed, self.summary)
         values, law = output.values(observed), law_of(self.noise)
         if law is not None:
-            return output, ByMean(law, values, output.counts)
+            return ObservedOutput(observed, output, ByMean(law, values, output.counts))
         given = None if self.noise is None else given_noise(self.noise, output)  # pyright: ignore[reportArgumentType]  no function is left
-        return output, Plain(values, given)
+        return ObservedOutput(observed, output, Plain(values, given))
 
-    def measure(self, observed: np.ndarray, signals: Sequence[np.ndarray | None]) -> Measured:
+    def measure(self, observed: ObservedOutput, signals: Sequence[np.ndarray | None]) -> Measured:
         """Features are the output's values."""
-        output, scale = self.view(observed)
+        array, output, scale = observed
         named = "summary" if self.discrepancy is None else "discrepancy"
         distance = self.discrepancy or self._of_summaries
-        discrepancy, errors = evaluate(distance, observed, signals, named)
+        discrepancy, errors = evaluate(distance, array, signals, named)
         features = np.full((len(signals), len(scale.observed)), np.nan)
         for i, signal in enumerate(signals):
             if signal is None or not np.isfinite(discrepancy[i]):
@@ -486,11 +484,11 @@ class SignalFamily(Family):
             try:
                 features[i] = output.values(signal)
             except (Exception, SystemExit) as error:  # of the user's summary
-                errors[i] = failed_on("summary", signal, observed, error)
+                errors[i] = failed_on("summary", signal, array, error)
             try:
                 scale.check(features[i])
             except (Exception, SystemExit) as error:  # of the user's function of the mean
-                errors[i], features[i] = failed_on("noise", signal, observed, error), np.nan
+                errors[i], features[i] = failed_on("noise", signal, array, error), np.nan
         failed = ~np.isfinite(features).all(1)
         return Measured(features, np.where(failed, np.nan, discrepancy), errors)
 
@@ -506,13 +504,13 @@ class SignalFamily(Family):
         finite = bool(np.isfinite(values).all())
         return None if finite else not_finite(f"summary returns {infinities(values)}")
 
-    def learn(self, data: TrainingData, key: jax.Array) -> SignalSurrogate:
+    def learn(self, data: TrainingData, key: np.ndarray) -> SignalSurrogate:
         return self.search(data, key, None)
 
     def search(
-        self, data: TrainingData, key: jax.Array, previous: SignalSurrogate | None
+        self, data: TrainingData, key: np.ndarray, previous: SignalSurrogate | None
     ) -> SignalSurrogate:
-        output, scale = self.view(data.observed)
+        _, output, scale = data.observed
         if previous is not None and goes_on(previous.emulator, previous.scale.of(data.features)):
             scale = previous.scale
         else:

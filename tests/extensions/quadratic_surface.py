@@ -79,7 +79,7 @@ class QuadraticSurface(Family):
 
     noise: float = 0.1
 
-    def learn(self, data: TrainingData, key: Any) -> QuadraticSurrogate:
+    def learn(self, data: TrainingData, key: np.ndarray) -> QuadraticSurrogate:
         at, inverse = terms(data.u), precision(data.u)
         coefficients = inverse @ at.T @ data.features
         left = data.features - at @ coefficients
