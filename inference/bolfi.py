@@ -91,9 +91,10 @@ class Bolfi(Displayed):
             MIN_LEARN,
             MOST_SIMULATIONS,
         )
-        self._acquire = resolve_acquisition(acquisition, self.family.name, self.family.acquisition)
+        name = self.family.name or type(self.family).__name__
+        self._acquire = resolve_acquisition(acquisition, name, self.family.acquisition)
         self.settings: dict[str, object] = {
-            "surrogate": self.family.name or type(self.family).__name__,
+            "surrogate": name,
             **{name: describe(value) for name, value in vars(self.family).items()},
             "acquisition": describe(self._acquire),
             "seed": self.seed,

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from bolfi_liquids.inference.surrogates import Family, Surrogate
-from bolfi_liquids.inference.surrogates.base import TrainingData
+from bolfi_liquids.inference.surrogates import Family, Surrogate, TrainingData
 
 RIDGE = 1e-6  # prior precision of the coefficients
 
