@@ -18,6 +18,7 @@ from ..gp.process import (
     predict,
 )
 from ..types import Discrepancy
+from . import warnings
 from .base import Family, Measured, TrainingData
 from .processes import OfProcesses
 from .squared_difference import MIN_FREEDOM, evaluate, independent, numbers, squared_difference
@@ -31,15 +32,6 @@ from .threshold import (
     matched,
 )
 from .transform import Transform, candidates, check_transform
-from .warnings import (
-    EQUAL,
-    GUESSED,
-    LOW_THRESHOLD,
-    NEGATIVE,
-    NOISY,
-    complaints,
-    distance_warnings,
-)
 
 BETWEEN = 0.25  # of the least simulated discrepancy: the least that is taken for its minimum
 MIN_RESOLUTION = 1e-4  # of the spread of g(Delta)
@@ -166,13 +158,13 @@ class DiscrepancySurrogate(OfProcesses):
     def warnings(self, *, confirmed: bool = False) -> list[str]:
         """Warnings of the process's errors, unless it is confirmed, and of what was compared."""
         if self.equal:
-            return [EQUAL]
+            return [warnings.EQUAL]
         said = [*self.said]
         if not confirmed:
-            said += complaints(self.checks()["loo_z"], "discrepancy")
+            said += warnings.complaints(self.checks()["loo_z"], "discrepancy")
         if self.noisy:
-            said.append(NOISY)
-        return said if self.fits else [*said, LOW_THRESHOLD]
+            said.append(warnings.NOISY)
+        return said if self.fits else [*said, warnings.LOW_THRESHOLD]
 
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
         """One new discrepancy for each row of u [n, d]."""
@@ -339,13 +331,13 @@ class DiscrepancyFamily(Family):
 
     def learn(self, data: TrainingData, key: np.ndarray) -> DiscrepancySurrogate:
         rule = self._rule(data, independent)
-        said = () if rule is not None else (GUESSED,)
+        said = () if rule is not None else (warnings.GUESSED,)
         if self.threshold is None and data.discrepancy.min() < 0.0:
-            said = (NEGATIVE,)
+            said = (warnings.NEGATIVE,)
         if self.discrepancy is None:
             order = np.argsort(data.discrepancy)
             outputs = data.features[order].reshape(-1, *data.observed.shape)
-            said += tuple(distance_warnings(data.observed, outputs))
+            said += tuple(warnings.distance_warnings(data.observed, outputs))
         return replace(self._learn(data, None, rule).cautious, said=said)
 
     def _learn(

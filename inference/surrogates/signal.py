@@ -14,6 +14,7 @@ from ..gp.process import GP, fantasize
 from ..simulations.failures import Failure, not_finite
 from ..sobol import sobol
 from ..types import Discrepancy
+from . import warnings
 from .base import Family, Measured, TrainingData
 from .emulator import (
     PREDICTED_SHARE,
@@ -59,21 +60,6 @@ from .processes import OfProcesses
 from .signal_likelihood import SignalLikelihood, likelihood_of, node_log_densities
 from .squared_difference import MIN_FREEDOM, evaluate, failed_on, sum_of_squares
 from .success import learn_success
-from .warnings import (
-    EQUAL,
-    FALSE_ALARMS,
-    FEW_NUMBERS,
-    GENEROUS,
-    MISFIT,
-    OUTSIDE,
-    SMOOTH,
-    TOO_FAST,
-    UNPREDICTED,
-    complaints,
-    noise_warnings,
-    range_warnings,
-    unreached_warnings,
-)
 
 KEPT_NODES = 12  # nodes of unknown measurement noise that enter the likelihood
 SCREENED_POINTS = 128
@@ -214,26 +200,26 @@ class SignalSurrogate(OfProcesses):
         repeats, sized = self.emulator.repeats, self.emulator.size is not None
         if self.emulator.basis.used == 0 and not sized:
             if self.emulator.equal:
-                return [EQUAL, *self._of_data()]
+                return [warnings.EQUAL, *self._of_data()]
             fast = len(repeats) and not repeats.any()
-            return [TOO_FAST if fast else UNPREDICTED, *self._of_data()]
-        said = [] if confirmed else complaints(loo_errors(self.emulator), "output")
-        said += noise_warnings(noise_share(self.emulator), repeats, sized)
+            return [warnings.TOO_FAST if fast else warnings.UNPREDICTED, *self._of_data()]
+        said = [] if confirmed else warnings.complaints(loo_errors(self.emulator), "output")
+        said += warnings.noise_warnings(noise_share(self.emulator), repeats, sized)
         if self._outside():
-            said.append(OUTSIDE)
+            said.append(warnings.OUTSIDE)
         elif self._missed():
-            said.append(MISFIT)
+            said.append(warnings.MISFIT)
         elif self._smooth():
-            said.append(SMOOTH)
+            said.append(warnings.SMOOTH)
         elif self._generous():
-            said.append(GENEROUS)
+            said.append(warnings.GENEROUS)
         if self.known is None and len(self.observed) - self.u.shape[1] < MIN_FREEDOM:
-            said.append(FEW_NUMBERS)
+            said.append(warnings.FEW_NUMBERS)
         return said + self._of_data()
 
     def _of_data(self) -> list[str]:
         """Warnings of the observed values themselves."""
-        ranges = range_warnings(self.scale.observed) if self.known is None else []
+        ranges = warnings.range_warnings(self.scale.observed) if self.known is None else []
         return ranges + self.unreached
 
     @property
@@ -241,7 +227,7 @@ class SignalSurrogate(OfProcesses):
         """That an emulated number lies beyond all simulated ones, if it does."""
         values = self.scale.observed
         noise = float(self.scale.sds(values[None])[0, 0])
-        return unreached_warnings(values, self.scale.back(self.emulator.outputs), noise)
+        return warnings.unreached_warnings(values, self.scale.back(self.emulator.outputs), noise)
 
     def _missed(self) -> bool:
         """Whether the given noise does not explain what was observed."""
@@ -254,7 +240,7 @@ class SignalSurrogate(OfProcesses):
         if not even or known is None or known.factors.size or not known.white.all():
             return False
         least = np.min((self.emulator.outputs - self.observed) ** 2 @ (1.0 / known.white))
-        return bool(least < stats.chi2.ppf(FALSE_ALARMS, freedom))
+        return bool(least < stats.chi2.ppf(warnings.FALSE_ALARMS, freedom))
 
     def _smooth(self) -> bool:
         """Whether the noise that was found varies as slowly as a signal, and is most of what no

@@ -69,6 +69,10 @@ def family(request):
 
 @pytest.fixture(scope="module")
 def fit(family):
+    return fitted(family)
+
+
+def fitted(family):
     u = sobol(0, 0, RUNS, len(PRIOR))
     signals, data = simulate(PRIOR.from_unit(u), range(RUNS)), OBSERVED
     if family.name == "log_likelihood":
@@ -198,6 +202,18 @@ MEMBERS = {*vars(Surrogate), *Surrogate.__annotations__}
 def test_a_surrogate_keeps_its_protocol(learned, member):
     """A member without a check fails here."""
     globals()[f"check_{member}"](learned)
+
+
+def test_a_surrogate_that_ignores_pending_points_is_noticed():
+    learned = fitted(example()).learned
+
+    class Stubborn(type(learned)):
+        def fantasize(self, u):
+            return self
+
+    with pytest.raises(AssertionError):
+        check_fantasize(Stubborn(learned.u, learned.log_likelihood))
+    check_fantasize(learned)
 
 
 def test_the_engines_own_tell_of_themselves(learned):
