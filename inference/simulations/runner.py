@@ -14,7 +14,7 @@ from .executors import killed_its_worker, workers_of
 from .failures import FailureKind, NoSignals, raised, unusable
 from .job import (
     BATCH,
-    Batched,
+    BatchSimulator,
     Job,
     OneByOne,
     is_unusable,
@@ -174,7 +174,7 @@ class Runner:
         then idles: half a call takes nearly as long. One by one where a worker may die alone: a
         call with it."""
         pool = workers_of(executor) is not None
-        each = self.simulate.together if pool and isinstance(self.simulate, Batched) else 1
+        each = self.simulate.together if pool and isinstance(self.simulate, BatchSimulator) else 1
         return (orders[start : start + each] for start in range(0, len(orders), each))
 
     def _submit(self, executor: Executor, orders: list[Order]) -> None:

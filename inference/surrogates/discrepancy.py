@@ -203,9 +203,9 @@ def learn(
     values = np.minimum(discrepancy, discrepancy[~is_outlier(discrepancy)].max())
     n = len(u)
     with np.errstate(divide="ignore", invalid="ignore"):  # where the transform is undefined
-        known = previous is not None and not previous.equal
-        old = known and np.isfinite(previous.scale(values)).all()
-    if previous is not None and old and n < TRANSFORM_GROWTH * previous.chosen_at:
+        fits = previous is not None and np.isfinite(previous.scale(values)).all()
+    grown = previous is None or n >= TRANSFORM_GROWTH * previous.chosen_at
+    if previous is not None and fits and not (grown or previous.equal):
         data = Data(u, previous.scale(values)[None], normal)
         hyper, learned_at = previous.gp.hyper, previous.learned_at
         if n >= GROWTH * learned_at:
