@@ -17,7 +17,7 @@ from .inputs.prior import split_parameters
 from .inputs.recording import Recording
 
 if TYPE_CHECKING:
-    from .inference.simulations import Batched
+    from .inference.simulations import BatchSimulator
     from .inference.types import Discrepancy
     from .models import Cups, PourBatch, PourFrames, StirFrames, StirSetup
 
@@ -45,14 +45,14 @@ class FluidSimulator(ABC):
         """A text that two equal simulators share, and no others."""
 
     @property
-    def batched(self) -> "Batched":
+    def batched(self) -> "BatchSimulator":
         """`simulate` as the engine calls it: it stops itself when its time is over, and runs with
         other effects share a call."""
-        from .inference.simulations import Batched
+        from .inference.simulations import BatchSimulator
         from .models import EFFECTS
 
         neutral = {name: effect.neutral for name, effect in EFFECTS.items()}
-        return Batched(self.simulate, TOGETHER, time_limit, neutral)
+        return BatchSimulator(self.simulate, TOGETHER, time_limit, neutral)
 
 
 def time_limit(seconds: float) -> AbstractContextManager[None]:

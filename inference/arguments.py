@@ -106,15 +106,11 @@ def checked_integer(name: str, value: object, least: int = 1, most: int = LARGES
     Raises:
         ValueError: not an integer, or not from `least` to `most`.
     """
-    refusal = f"{name} must be an integer from {least} to {most}, got {value!r:.100}"
-    if isinstance(value, bool):
-        raise ValueError(refusal)
     try:
-        number = index(value)  # pyright: ignore[reportArgumentType]  or TypeError
-    except TypeError as error:
-        raise ValueError(refusal) from error
-    if not least <= number <= most:
-        raise ValueError(refusal)
+        number = least - 1 if isinstance(value, bool) else index(value)  # pyright: ignore[reportArgumentType]  or TypeError
+    except TypeError:
+        number = least - 1
+    _check(name, value, least <= number <= most, f"an integer from {least} to {most}")
     return number
 
 
@@ -130,25 +126,42 @@ def checked_array(name: str, value: object) -> np.ndarray:
         raise ValueError(f"{name} must be an array of numbers, got {value!r:.100}") from error
 
 
+def _check(name: str, value: object, fits: object, due: str) -> None:
+    if not fits:
+        raise ValueError(f"{name} must be {due}, got {value!r:.100}")
+
+
 def check_timeout(timeout: float | None) -> None:
     """Raise ValueError unless `timeout` is a positive and finite number of seconds, or None."""
     number = isinstance(timeout, int | float) and not isinstance(timeout, bool)
-    if timeout is not None and not (number and 0 < timeout < math.inf):
-        raise ValueError(f"timeout must be positive and finite [s], or None, got {timeout!r}")
+    fits = timeout is None or (number and 0 < timeout < math.inf)
+    _check("timeout", timeout, fits, "positive and finite [s], or None")
 
 
 def check_progress(progress: object) -> None:
     """Raise ValueError unless `progress` is True, False or a function."""
-    if not (isinstance(progress, bool) or callable(progress)):
-        raise ValueError(
-            f"progress must be True, False or a function of a count, got {progress!r:.100}"
-        )
+    fits = isinstance(progress, bool) or callable(progress)
+    _check("progress", progress, fits, "True, False or a function of a count")
 
 
 def check_flag(name: str, value: object) -> None:
     """Raise ValueError unless `value` is True or False."""
-    if not isinstance(value, bool | np.bool_):
-        raise ValueError(f"{name} must be True or False, got {value!r:.100}")
+    _check(name, value, isinstance(value, bool | np.bool_), "True or False")
+
+
+def check_text(name: str, value: object) -> None:
+    """Raise ValueError unless `value` is text."""
+    _check(name, value, isinstance(value, str), "text")
+
+
+def check_function(name: str, value: object) -> None:
+    """Raise ValueError unless `value` is a function."""
+    _check(name, value, callable(value), "a function")
+
+
+def check_callable(name: str, value: object) -> None:
+    """Raise ValueError unless `value` is a function or None."""
+    _check(name, value, value is None or callable(value), "a function or None")
 
 
 def checked_number(name: str, value: object, fits: Callable[[float], bool], due: str) -> float:
@@ -168,8 +181,7 @@ def checked_number(name: str, value: object, fits: Callable[[float], bool], due:
     except Unusable:
         array = np.array(math.nan)
     number = float(array) if array.shape == () else math.nan
-    if math.isnan(number) or not fits(number):
-        raise ValueError(f"{name} must be {due}, got {value!r:.100}")
+    _check(name, value, not math.isnan(number) and fits(number), due)
     return number
 
 
@@ -199,21 +211,3 @@ def check_kind(name: str, value: object, kind: Any) -> None:
             f"{name} must be of the type {due}, got {value!r:.100} of the type "
             f"{type(value).__name__}"
         )
-
-
-def check_text(name: str, value: object) -> None:
-    """Raise ValueError unless `value` is text."""
-    if not isinstance(value, str):
-        raise ValueError(f"{name} must be text, got {value!r:.100}")
-
-
-def check_function(name: str, value: object) -> None:
-    """Raise ValueError unless `value` is a function."""
-    if not callable(value):
-        raise ValueError(f"{name} must be a function, got {value!r:.100}")
-
-
-def check_callable(name: str, value: object) -> None:
-    """Raise ValueError unless `value` is a function or None."""
-    if value is not None and not callable(value):
-        raise ValueError(f"{name} must be a function or None, got {value!r:.100}")

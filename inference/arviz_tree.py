@@ -17,8 +17,9 @@ nothing from one, and the fit's complaints in the attribute `warnings`. simulati
 `fit_status`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib.metadata import version
+from typing import TYPE_CHECKING
 
 import arviz_base
 import numpy as np
@@ -27,8 +28,10 @@ import xarray as xr
 from .history import History
 from .prior import Prior
 from .sampling.convergence import diagnose
-from .sampling.target import Chains
-from .surrogates.base import Surrogate
+from .sampling.draw import Sampled
+
+if TYPE_CHECKING:
+    from .result import Fit
 
 PREDICTED_DRAWS = 50  # draws of each chain for which the surrogate predicts
 SAMPLE_DIMS = ("chain", "draw")
@@ -36,7 +39,8 @@ SAMPLE_DIMS = ("chain", "draw")
 
 def simulations_dataset(prior: Prior, history: History) -> xr.Dataset:
     """Every simulation along dimension `simulation`, in the order told."""
-    axes = [f"signal_dim_{i}" for i in range(history.signals.ndim - 1)]
+    signals = history.signals
+    axes = [f"signal_dim_{i}" for i in range(signals.ndim - 1)]
     columns = {name: ("simulation", c) for name, c in prior.to_dict(history.theta).items()}
     return xr.Dataset(
         {
@@ -46,46 +50,38 @@ def simulations_dataset(prior: Prior, history: History) -> xr.Dataset:
             "discrepancy": ("simulation", history.discrepancy),
             "failed": ("simulation", ~history.succeeded),
             "error": ("simulation", history.errors),
-            "signal": (["simulation", *axes], history.signals),
+            "signal": (["simulation", *axes], signals),
         }
     )
 
 
 def results_tree(
-    prior: Prior,
-    chains: Chains,
-    prior_draws: Mapping[str, np.ndarray],
-    observed: np.ndarray,
-    simulations: xr.Dataset,
+    fit: "Fit", made: Sampled, seed: int, attributes: Mapping[str, object]
 ) -> xr.DataTree:
-    """The groups that every result has: posterior, prior, sample_stats, observed_data, simulations.
+    """What `Fit.sample` returns.
 
     Args:
-        prior: Gives names, units and descriptions to the parameters.
-        chains: The draws.
-        prior_draws: Name -> [n], in natural units.
-        observed: The measured signal.
-        simulations: Becomes a group of its own.
-
-    Returns:
-        Tree that `to_netcdf` can write. Each parameter carries its `prior` and, where known,
-        its `units`; in the posterior also R-hat, ESS and Monte Carlo standard errors (in its
-        own units) as from `convergence.diagnose`. The posterior's attributes hold the worst
-        of these and the number of `divergences`.
+        fit: What was sampled.
+        made: The draws.
+        seed: Of the prior's draws, as many as each chain's, and of the predictions.
+        attributes: Of the root.
     """
+    prior, chains = fit.prior, made.chains
     posterior = prior.from_unit(chains.u)
+    rng = np.random.default_rng([seed, *b"prior"])
+    drawn = prior.from_unit(rng.random((chains.u.shape[1], len(prior))))
     tree = arviz_base.from_dict(
         {
             "posterior": posterior,
             "sample_stats": dict(chains.stats),
-            "prior": {name: values[None] for name, values in prior_draws.items()},
-            "observed_data": {"signal": observed},
+            "prior": {name: values[None] for name, values in drawn.items()},
+            "observed_data": {"signal": fit.observed},
         }
     )
-    tree["simulations"] = xr.DataTree(simulations)
+    tree["simulations"] = xr.DataTree(fit.simulations)
     for group in ("posterior", "prior", "simulations"):
-        for name, attributes in prior.describe().items():
-            tree[group][name].attrs.update(attributes)
+        for name, described in prior.describe().items():
+            tree[group][name].attrs.update(described)
     diagnosed = {name: diagnose(draws) for name, draws in posterior.items()}
     for name, measures in diagnosed.items():
         tree["posterior"][name].attrs.update(measures)
@@ -94,21 +90,29 @@ def results_tree(
         ess_bulk_min=min(measures["ess_bulk"] for measures in diagnosed.values()),
         ess_tail_min=min(measures["ess_tail"] for measures in diagnosed.values()),
         divergences=int(np.sum(chains.stats.get("diverging", 0))),
+        status=made.status,
+        draws_made=made.steps,
+        **made.checks,
     )
+    constants = {name: np.asarray(value) for name, value in fit.learned.constants().items()}
+    if constants:
+        tree["constant_data"] = arviz_base.from_dict({"constant_data": constants})["constant_data"]
+    _predict(tree, fit, chains.u, np.random.default_rng([seed, *b"predictive"]))
+    tree["emulator_checks"] = xr.DataTree(_emulator_checks(fit))
+    for group in tree.children.values():
+        sampled = [name for name in SAMPLE_DIMS if name in group.dims]
+        group.attrs.pop("sample_dims", None)
+        if sampled:
+            group.attrs["sample_dims"] = sampled
+    tree.attrs.update(attributes, version=version("bolfi-liquids"))
     return tree
 
 
-def add_surrogate(
-    tree: xr.DataTree, surrogate: Surrogate, u: np.ndarray, rng: np.random.Generator
-) -> None:
-    """Add what the surrogate says of itself: constant_data, and posterior_predictive at evenly
-    spaced draws u [chain, draw, d], whose indices are its coordinate `draw`."""
-    constants = {name: np.asarray(value) for name, value in surrogate.constants().items()}
-    if constants:
-        tree["constant_data"] = arviz_base.from_dict({"constant_data": constants})["constant_data"]
+def _predict(tree: xr.DataTree, fit: "Fit", u: np.ndarray, rng: np.random.Generator) -> None:
+    """Add posterior_predictive at evenly spaced ones of the draws u [chain, draw, d]."""
     chains, draws, d = u.shape
     rows = np.linspace(0, draws - 1, min(draws, PREDICTED_DRAWS)).round().astype(int)
-    predicted = surrogate.predictive(rng, u[:, rows].reshape(-1, d))
+    predicted = fit.learned.predictive(rng, u[:, rows].reshape(-1, d))
     groups = {
         name: np.asarray(values).reshape(chains, len(rows), *np.shape(values)[1:])
         for name, values in predicted.items()
@@ -118,31 +122,12 @@ def add_surrogate(
         tree["posterior_predictive"] = made["posterior_predictive"]
 
 
-def add_checks(
-    tree: xr.DataTree,
-    checks: Mapping[str, np.ndarray],
-    training_mask: np.ndarray,
-    warnings: Sequence[str],
-) -> None:
-    """Add emulator_checks, whose first axis is the simulation, with rows of NaN where nothing was
-    learned from one (`training_mask`, bool [n]). The attribute `warnings` joins what the fit
-    complains of, one per line, and is empty where there is nothing."""
+def _emulator_checks(fit: "Fit") -> xr.Dataset:
+    """The surrogate's checks with a row for each simulation."""
     columns = {}
-    for name, values in checks.items():
-        of_all = np.full((len(training_mask), *values.shape[1:]), np.nan)
-        of_all[training_mask] = values
+    for name, values in fit.learned.checks().items():
+        of_all = np.full((len(fit.training_mask), *values.shape[1:]), np.nan)
+        of_all[fit.training_mask] = values
         axes = (f"{name}_dim_{i}" for i in range(values.ndim - 1))
         columns[name] = (["simulation", *axes], of_all)
-    attributes = {"warnings": "\n".join(warnings)}
-    tree["emulator_checks"] = xr.DataTree(xr.Dataset(columns, attrs=attributes))
-
-
-def finished(tree: xr.DataTree, attributes: Mapping[str, object]) -> xr.DataTree:
-    """The tree with how it was made at its root, and in each group ArviZ's `sample_dims`."""
-    for group in tree.children.values():
-        sampled = [name for name in SAMPLE_DIMS if name in group.dims]
-        group.attrs.pop("sample_dims", None)
-        if sampled:
-            group.attrs["sample_dims"] = sampled
-    tree.attrs.update(attributes, version=version("bolfi-liquids"))
-    return tree
+    return xr.Dataset(columns, attrs={"warnings": "\n".join(fit.warnings)})

@@ -83,6 +83,7 @@ class Bolfi(Displayed):
         self.prior = prior
         self.family = resolve(surrogate, options)
         self.observed = self.family.observe(observed)
+        self._view = self.family.view(self.observed)
         self.seed = checked_integer("seed", seed, 0)
         self.initial = checked_integer(
             "initial",
@@ -90,15 +91,16 @@ class Bolfi(Displayed):
             MIN_LEARN,
             MOST_SIMULATIONS,
         )
-        self._acquire = resolve_acquisition(acquisition, self.family.name, self.family.acquisition)
+        name = self.family.name or type(self.family).__name__
+        self._acquire = resolve_acquisition(acquisition, name, self.family.acquisition)
         self.settings: dict[str, object] = {
-            "surrogate": self.family.name,
+            "surrogate": name,
             **{name: describe(value) for name, value in vars(self.family).items()},
             "acquisition": describe(self._acquire),
             "seed": self.seed,
             "initial": self.initial,
         }
-        features = self.family.measure(self.observed, []).features
+        features = self.family.measure(self._view, []).features
         self._state = init(len(prior), self.observed.shape, features)
         self._learned: Any = None  # the family's surrogate, once there is one
         self._before: Before | None = None  # the posterior of which `confirm` drew
@@ -126,27 +128,22 @@ class Bolfi(Displayed):
     @property
     def told(self) -> int:
         """Simulations told so far, failed ones included."""
-        return len(self._state.history.theta)
+        return len(self.history.theta)
 
     @property
     def succeeded(self) -> int:
         """Simulations told so far that gave a finite discrepancy, copies counted once."""
-        return int(self._state.history.distinct.sum())
+        return int(self.history.distinct.sum())
 
     @property
-    def errors(self) -> list[str]:
-        """Why simulations failed, in the order told."""
-        return [str(failure) for failure in self._state.history.why if failure is not None]
-
-    @property
-    def signal_shape(self) -> tuple[int, ...]:
-        """Shape of one simulated signal: that of `observed`, or of most signals told so far."""
-        return self._state.history.signal_shape
+    def history(self) -> History:
+        """Simulations told so far."""
+        return self._state.history
 
     @property
     def expected_shape(self) -> tuple[int, ...] | None:
-        """`signal_shape`; None where a user's discrepancy or summary takes signals of any shape."""
-        return None if self.family.any_shape else self.signal_shape
+        """Of a signal; None where a user's discrepancy or summary takes signals of any shape."""
+        return None if self.family.any_shape else self.history.signal_shape
 
     def ask(self, n: int = 1) -> dict[str, np.ndarray]:
         """The next n different points to simulate, name -> [n].
@@ -185,7 +182,7 @@ class Bolfi(Displayed):
             ValueError: bad argument.
         """
         n = checked_integer("n", n, 1, MOST_SIMULATIONS)
-        if not isinstance(fit, Fit) or fit.history is not self._state.history:
+        if not isinstance(fit, Fit) or fit.history is not self.history:
             raise ValueError(f"fit must be what `fit` returned last, got {fit!r:.100}")
         started = time.perf_counter()
         drawn = fit.population.resample(np.random.default_rng([self.seed, self.asked]), n)
@@ -205,34 +202,31 @@ class Bolfi(Displayed):
     @in_float64
     def _acquired(self, n: int, designed: np.ndarray) -> np.ndarray:
         """theta [n, d] of the engine's choice, `designed` [m, d] being asked with them."""
-        history = self._state.history
         pending = np.concatenate([self._state.pending, designed])
-        key = self._key()
-        self._learned = self.family.search(self._training_data(), key, self._learned)
-        repeated = next_replicate(history, pending) if self.family.replicates else None
+        words = self._words()
+        self._learned = self.family.search(self._training_data(), words, self._learned)
+        repeated = next_replicate(self.history, pending) if self.family.replicates else None
         parts = [] if repeated is None else [repeated[None]]
         if n > len(parts):
+            key = jax.random.wrap_key_data(jax.device_put(words), impl="threefry2x32")
             fantasized = self._learned.fantasize(self.prior.to_unit(self.prior.to_dict(pending)))
             shape = n - len(parts), len(self.prior)
             u = chosen(self._acquire(key, fantasized, shape[0]), shape)
             parts.append(self.prior.to_array(self.prior.from_unit(u)))
         return np.concatenate(parts)
 
-    def _key(self) -> jax.Array:
-        """Made by NumPy: JAX would compile for half a second."""
-        words = np.random.SeedSequence([self.seed, self._state.asked]).generate_state(2)
-        return jax.random.wrap_key_data(jax.device_put(words), impl="threefry2x32")
+    def _words(self) -> np.ndarray:
+        """A key of JAX as NumPy makes it: JAX would compile for half a second."""
+        return np.random.SeedSequence([self.seed, self._state.asked]).generate_state(2)
 
     @property
     def _training_mask(self) -> np.ndarray:
         """Which runs are learned from, bool [n]: no copies, nor what blew up."""
-        history = self._state.history
-        return history.distinct & ~is_outlier(history.discrepancy)
+        return self.history.distinct & ~is_outlier(self.history.discrepancy)
 
     def _training_data(self) -> TrainingData:
-        history = self._state.history
-        good = self._training_mask
-        known = self.observed, history.u[good], history.features[good], history.discrepancy[good]
+        history, good = self.history, self._training_mask
+        known = self._view, history.u[good], history.features[good], history.discrepancy[good]
         # runs that blew up did not succeed
         succeeded = history.succeeded & ~is_outlier(history.discrepancy)
         return TrainingData(*known, self.prior.normal, RunOutcomes(history.u, succeeded))
@@ -265,12 +259,16 @@ class Bolfi(Displayed):
         """
         started = time.perf_counter()
         natural = np.atleast_2d(self.prior.to_array(theta))
-        self._check_number(len(natural))
+        if self.told + len(natural) > MOST_SIMULATIONS:
+            raise ValueError(
+                f"theta holds {len(natural)} simulations beside the {self.told} told before; a run "
+                f"may have {MOST_SIMULATIONS} in all: leave the least useful out"
+            )
         rows = self.prior.to_dict(natural)
         told_rows, faults = self._signals(len(natural), signals)
         check_support(self.prior, rows)
         given_seeds = told_seeds(seeds, len(natural))
-        measured = self.family.measure(self.observed, told_rows)
+        measured = self.family.measure(self._view, told_rows)
         measured = _located(measured, rows, given_seeds)
         given_errors = told_errors(errors, np.isfinite(measured.discrepancy))
         self._check_compared(measured)
@@ -289,14 +287,6 @@ class Bolfi(Displayed):
         self._state = remember_told(self._state, told)
         self._seconds += time.perf_counter() - started
 
-    def _check_number(self, n: int) -> None:
-        """Raise ValueError if n more simulations are more than one run may have."""
-        if self.told + n > MOST_SIMULATIONS:
-            raise ValueError(
-                f"theta holds {n} simulations beside the {self.told} told before; a run may have "
-                f"{MOST_SIMULATIONS} in all: leave the least useful out"
-            )
-
     def _check_compared(self, measured: Measured) -> None:
         """Raise ValueError if the user's own function failed on all of the first signals.
 
@@ -307,7 +297,7 @@ class Bolfi(Displayed):
             return
         failed = [
             failure
-            for failure in (*self._state.history.why, *measured.errors)
+            for failure in (*self.history.why, *measured.errors)
             if failure is not None and failure.kind is FailureKind.INCOMPARABLE
         ]
         if len(failed) >= BATCH:
@@ -359,19 +349,17 @@ class Bolfi(Displayed):
         check_flag("warn", warn)
         stacklevel = checked_integer("stacklevel", stacklevel)
         if self.succeeded < MIN_LEARN:
-            last = f"; the last error: {self.errors[-1]}" if self.errors else ""
             raise ValueError(
                 f"a fit needs {MIN_LEARN} successful simulations, got {self.succeeded} of "
-                f"{self.told} told; tell more{last}"
+                f"{self.told} told; tell more; the last error: {self.history.last_error}"
             )
         started = time.perf_counter()
-        known, history = self._training_data(), self._state.history
-        fitted = in_float64(self.family.learn)(known, self._key())
+        fitted = in_float64(self.family.learn)(self._training_data(), self._words())
         self._seconds += time.perf_counter() - started
         made = Fit(
             prior=self.prior,
             observed=self.observed,
-            history=history,
+            history=self.history,
             learned=fitted,
             training_mask=self._training_mask,
             settings=self.settings,

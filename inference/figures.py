@@ -4,9 +4,15 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+from xarray import DataTree
+
+from .arguments import check_kind
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from .history import History
+    from .result import Fit
 
 INK, GREY = "#1f2933", "#8a94a0"
 COLOURS = ("#2463a6", "#d1591a", "#2d8659", "#8a4fa3", "#b8860b", "#5b6770", "#c2185b", "#00838f")
@@ -24,18 +30,12 @@ def check_axes(axes: object, name: str = "axes") -> None:
         raise ValueError(f"{name} must be of Matplotlib, as of plt.subplots(), got {axes!r:.100}")
 
 
-def plot_search(rounds: np.ndarray, discrepancy: np.ndarray, ax: "Axes | None") -> "Axes":
-    """Discrepancies by round, and the least so far.
-
-    Args:
-        rounds: In which each simulation was asked [n]; negative where it was made elsewhere.
-        discrepancy: [n], NaN where a simulation failed.
-        ax: To draw on; None makes a figure.
-    """
+def plot_search(history: "History", ax: "Axes | None") -> "Axes":
+    """See `Fit.plot_search`."""
     check_axes(ax, "ax")
     if ax is None:
         ax = plt.subplots(figsize=(5.2, 3.4), layout="constrained")[1]
-    at = np.maximum(rounds + 1, 0)  # 0: before the first round
+    at, discrepancy = np.maximum(history.rounds + 1, 0), history.discrepancy  # 0: made before
     there = np.isfinite(discrepancy)
     ax.plot(at[there], discrepancy[there], "o", ms=4, color=PREDICTED, label="simulation")
     if there.any():
@@ -54,22 +54,18 @@ def plot_search(rounds: np.ndarray, discrepancy: np.ndarray, ax: "Axes | None") 
     return bare(ax)
 
 
-def plot_predictive(
-    observed: np.ndarray, closest: np.ndarray, predicted: np.ndarray | None, axes: Any
-) -> "list[Axes]":
-    """The observed output, the closest simulation, and the posterior predictive distribution.
-
-    Args:
-        observed: [t, *channels], NaN where missing.
-        closest: The simulation of least discrepancy, of the same shape; else it is left out.
-        predicted: Draws of new observations [n, t, *channels]; None, or another shape, leaves
-            them out.
-        axes: One for each channel, of which six are drawn at most; None makes a figure.
-    """
+def plot_predictive(fit: "Fit", sampled: DataTree | None, axes: Any) -> "list[Axes]":
+    """See `Fit.plot_predictive`; what has another shape than the data is left out."""
+    check_kind("sampled", sampled, DataTree | None)
+    check_axes(axes)
+    tree = fit.sample(draws=250, warmup=250, warn=False) if sampled is None else sampled
+    observed, closest = fit.observed, fit.closest.signal
     panels = _channels(observed)[:MAX_PANELS]
     near = _channels(closest) if closest.shape == observed.shape else None
+    groups = tree["posterior_predictive"] if "posterior_predictive" in tree.children else {}
     draws = None
-    if predicted is not None and predicted.shape[1:] == observed.shape:
+    if "signal" in groups and groups["signal"].shape[2:] == observed.shape:
+        predicted = groups["signal"].to_numpy().reshape(-1, *observed.shape)
         draws = np.stack([_channels(one) for one in predicted], axis=1)  # [channel, n, t]
     size = (5.2, 1.2 + 1.8 * len(panels))
     given = some_axes(axes, len(panels), "channels", nrows=len(panels), figsize=size, sharex=True)

@@ -81,6 +81,11 @@ class History(NamedTuple):
         return np.array(["" if one is None else str(one) for one in self.why], str)
 
     @property
+    def last_error(self) -> str:
+        """Why the last of the failed runs failed; "none" where none did."""
+        return next((str(failure) for failure in self.why[::-1] if failure is not None), "none")
+
+    @property
     def failures(self) -> dict[str, int]:
         """Failed runs by `FailureKind`."""
         return count(self.why)

@@ -203,7 +203,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         if engine.succeeded < MIN_LEARN:
             raise RuntimeError(
                 f"{engine.succeeded} of {engine.told} simulations succeeded, copies counted once; "
-                f"{MIN_LEARN} are needed; the last error: {(engine.errors or ['none'])[-1]}. "
+                f"{MIN_LEARN} are needed; the last error: {engine.history.last_error}. "
                 f"{runner.bank.where}; mend the cause, or raise budget, and repeat the call to go "
                 "on from there"
             )
@@ -336,13 +336,13 @@ def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Si
     if engine.expected_shape is not None:
         results = of_one_shape(results, asked, engine.expected_shape)
     errors = [result.error for result in results]
-    failed = np.full(engine.signal_shape, np.nan)
+    failed = np.full(engine.history.signal_shape, np.nan)
     signals = [failed if result.signal is None else result.signal for result in results]
-    engine.tell(theta, signals, seeds, errors)  # pyright: ignore[reportArgumentType]
+    engine.tell(theta, signals, seeds, errors)
     if engine.told >= engine.initial and engine.succeeded == 0:
         raise RuntimeError(
             f"all {engine.told} simulations of the start design failed; the last error: "
-            f"{engine.errors[-1]}"
+            f"{engine.history.last_error}"
         )
     return results
 

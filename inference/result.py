@@ -150,7 +150,9 @@ class Fit(Displayed):
         along each of d parameters, and one that could contradict.
         """
         said = self.learned.warnings(confirmed=self.confirmed is True)
-        said += history_warnings(self.history) + self._data_warnings()
+        said += history_warnings(self.history)
+        if {self.settings.get("summary", "None"), self.settings.get("discrepancy")} == {"None"}:
+            said += censored_warnings(self.observed, self.closest.signal)
         if self.doubt > MUCH_DOUBT:
             said.append(DOUBTED)
         if self.confirmed is False:
@@ -222,11 +224,6 @@ class Fit(Displayed):
         known = found._replace(x=found.x[there], log_weights=log_weights)
         (mean, sd), (sure_mean, sure_sd) = found.moments, known.moments
         return float(np.max(np.hypot(sd, mean - sure_mean) / np.maximum(sure_sd, LEAST)))
-
-    def _data_warnings(self) -> list[str]:
-        """Warnings about the observed output."""
-        own = {self.settings.get("summary", "None"), self.settings.get("discrepancy")}
-        return censored_warnings(self.observed, self.closest.signal) if own == {"None"} else []
 
     @property
     def surrogate(self) -> SurrogateView:
@@ -335,7 +332,7 @@ class Fit(Displayed):
         extend = checked_integer("extend", extend)
         seed = checked_integer("seed", seed, 0)
         check_flag("warn", warn)
-        from .arviz_tree import add_checks, add_surrogate, finished, results_tree
+        from .arviz_tree import results_tree
 
         started = time.perf_counter()
         length = Length(chains, warmup, draws)
@@ -343,20 +340,13 @@ class Fit(Displayed):
         if warn and made.found:
             warnings.warn(made.status, SamplingWarning, stacklevel=3)  # beyond `in_float64`
         seconds = {**self.seconds, "sampling": time.perf_counter() - started}
-        rng = np.random.default_rng([seed, *b"prior"])
-        drawn = self.prior.from_unit(rng.random((draws, len(self.prior))))
-        tree = results_tree(self.prior, made.chains, drawn, self.observed, self.simulations)
-        tree["posterior"].attrs.update(status=made.status, draws_made=made.steps, **made.checks)
-        rng = np.random.default_rng([seed, *b"predictive"])
-        add_surrogate(tree, self.learned, made.chains.u, rng)
-        add_checks(tree, self.learned.checks(), self.training_mask, self.warnings)
         attributes: dict[str, object] = {
             **self.settings,
             **{"sampler": sampler, **length._asdict(), "extend": extend, "sampling_seed": seed},
             "fit_status": self.status,
             **{f"seconds_{part}": spent for part, spent in seconds.items()},
         }
-        return finished(tree, attributes)
+        return results_tree(self, made, seed, attributes)
 
     def check(self, n: int = 200, **how: Any) -> "FitCheck":
         """Ranks and coverage of the pipeline that made this fit, on n data sets of known truth.
@@ -402,7 +392,7 @@ class Fit(Displayed):
         """
         from .figures import plot_search
 
-        return plot_search(self.history.rounds, self.history.discrepancy, ax)
+        return plot_search(self.history, ax)
 
     def plot_predictive(
         self, sampled: "xr.DataTree | None" = None, axes: Any = None
@@ -419,19 +409,6 @@ class Fit(Displayed):
         Raises:
             ValueError: `sampled` is no tree, or `axes` are no axes of Matplotlib, or too few.
         """
-        from xarray import DataTree
+        from .figures import plot_predictive
 
-        from .figures import check_axes, plot_predictive
-
-        if sampled is not None and not isinstance(sampled, DataTree):
-            raise ValueError(
-                f"sampled must be what `sample` returned or None, got {sampled!r:.100}"
-            )
-        check_axes(axes)
-        tree = self.sample(draws=250, warmup=250, warn=False) if sampled is None else sampled
-        groups = tree["posterior_predictive"] if "posterior_predictive" in tree.children else {}
-        predicted = None
-        if "signal" in groups:
-            values = groups["signal"].to_numpy()  # [chain, draw, *shape]
-            predicted = values.reshape(-1, *values.shape[2:])
-        return plot_predictive(self.observed, self.closest.signal, predicted, axes)
+        return plot_predictive(self, sampled, axes)

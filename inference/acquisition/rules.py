@@ -4,7 +4,6 @@ Every rule scores in logs, so that nothing underflows far from the posterior, an
 point of a batch before it chooses the next (see `fantasize` of the surrogates).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -26,15 +25,10 @@ MIN_EFFECTIVE = 32.0  # candidates that count, effectively
 MIN_POWER = 1e-6
 
 
-def exploration_width(t: int, dimension: int, epsilon: float = 0.1) -> float:
-    """eta_t, eta_t^2 = 2 log(t^(d/2 + 2) pi^2 / (3 epsilon)) (Gutmann and Corander 2016).
-
-    Args:
-        t: Simulations so far, at least 1.
-        dimension: d.
-        epsilon: eps_eta, 0.1 in the paper.
-    """
-    return float(np.sqrt(2.0 * np.log(t ** (dimension / 2 + 2) * np.pi**2 / (3.0 * epsilon))))
+def exploration_width(t: int, dimension: int) -> float:
+    """eta_t, eta_t^2 = 2 log(t^(d/2 + 2) pi^2 / (3 eps_eta)), eps_eta = 0.1, after t simulations
+    (Gutmann and Corander 2016)."""
+    return float(np.sqrt(2.0 * np.log(t ** (dimension / 2 + 2) * np.pi**2 / (3.0 * 0.1))))
 
 
 @dataclass(frozen=True)
@@ -120,28 +114,30 @@ def log_moments(surrogate: Surrogate, u: np.ndarray) -> tuple[np.ndarray, np.nda
     return first, 2.0 * first + excess + np.log(-np.expm1(-excess))
 
 
-Score = Callable[[np.random.Generator, Surrogate, Candidates], np.ndarray]
-"""(rng, surrogate, candidates) -> log scores [CANDIDATES]."""
+class BestCandidates:
+    """The candidates of highest score, each fantasized before the next is scored."""
 
+    def _score(
+        self, rng: np.random.Generator, surrogate: Surrogate, found: Candidates
+    ) -> np.ndarray:
+        """Log scores [CANDIDATES]."""
+        raise NotImplementedError
 
-def best_candidates(score: Score, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
-    """The candidates of highest score, each fantasized before the next is scored: [n, d].
-
-    The score is lowered by the log chance that a run succeeds.
-    """
-    rng = generator(key)
-    found = candidates(rng, surrogate)
-    points: list[np.ndarray] = []
-    while len(points) < n:
-        scores = score(rng, surrogate, found) + found.log_success
-        scores = np.where(np.isnan(scores) | _taken(found.u, points), -np.inf, scores)
-        if not np.isfinite(scores).any():  # all chosen: look for others
-            found = candidates(rng, surrogate)
-            scores = np.where(_taken(found.u, points), -np.inf, rng.uniform(size=len(found.u)))
-        points.append(found.u[np.argmax(scores)])
-        if len(points) < n:
-            surrogate = surrogate.fantasize(points[-1][None])
-    return np.stack(points)
+    def __call__(self, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
+        """n different points u [n, d]; scores are lowered by the log chance that a run succeeds."""
+        rng = generator(key)
+        found = candidates(rng, surrogate)
+        points: list[np.ndarray] = []
+        while len(points) < n:
+            scores = self._score(rng, surrogate, found) + found.log_success
+            scores = np.where(np.isnan(scores) | _taken(found.u, points), -np.inf, scores)
+            if not np.isfinite(scores).any():  # all chosen: look for others
+                found = candidates(rng, surrogate)
+                scores = np.where(_taken(found.u, points), -np.inf, rng.uniform(size=len(found.u)))
+            points.append(found.u[np.argmax(scores)])
+            if len(points) < n:
+                surrogate = surrogate.fantasize(points[-1][None])
+        return np.stack(points)
 
 
 def _taken(u: np.ndarray, points: list[np.ndarray]) -> np.ndarray:
@@ -150,20 +146,17 @@ def _taken(u: np.ndarray, points: list[np.ndarray]) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class MaxVariance:
+class MaxVariance(BestCandidates):
     """Maximise Var[L(u)] (MaxVar, Jarvenpaa et al. 2019)."""
 
-    def __call__(self, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
-        """n different points u [n, d]."""
-        return best_candidates(self._score, key, surrogate, n)
-
-    @staticmethod
-    def _score(_: np.random.Generator, surrogate: Surrogate, found: Candidates) -> np.ndarray:
+    def _score(
+        self, rng: np.random.Generator, surrogate: Surrogate, found: Candidates
+    ) -> np.ndarray:
         return log_moments(surrogate, found.u)[1]
 
 
 @dataclass(frozen=True)
-class PosteriorDraws:
+class PosteriorDraws(BestCandidates):
     """Draws from the posterior, mixed with maximisers of Var[L(u)].
 
     Attributes:
@@ -174,10 +167,6 @@ class PosteriorDraws:
 
     def __post_init__(self) -> None:
         checked_number("share", self.share, lambda share: 0.0 <= share <= 1.0, "from 0 to 1")
-
-    def __call__(self, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
-        """n different points u [n, d]."""
-        return best_candidates(self._score, key, surrogate, n)
 
     def _score(
         self, rng: np.random.Generator, surrogate: Surrogate, found: Candidates
@@ -190,19 +179,16 @@ class PosteriorDraws:
 
 
 @dataclass(frozen=True)
-class ExpectedIntegratedVariance:
+class ExpectedIntegratedVariance(BestCandidates):
     """Minimise Var[L] as it is expected after the run, integrated over the box.
 
     EIV of Jarvenpaa et al. (2019), EIVAR of Surer et al. (2024). Since E[L^2] does not change
     in expectation, that is to maximise the integral of E[E[L | run]^2].
     """
 
-    def __call__(self, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
-        """n different points u [n, d]."""
-        return best_candidates(self._score, key, surrogate, n)
-
-    @staticmethod
-    def _score(rng: np.random.Generator, surrogate: Surrogate, found: Candidates) -> np.ndarray:
+    def _score(
+        self, rng: np.random.Generator, surrogate: Surrogate, found: Candidates
+    ) -> np.ndarray:
         rows = rng.permutation(len(found.u))[:INTEGRATION_NODES]
         resolved = surrogate.log_second_moment(found.u[rows], found.u)
         return log_sum_exp((resolved - found.log_density[rows, None]).T)

@@ -165,7 +165,11 @@ def sample_nuts(rng: np.random.Generator, target: Target, length: Length) -> Ite
 def _blocks(
     rng: np.random.Generator, target: Target, guide: Guide, start: np.ndarray, warmup: int
 ) -> Iterator[Chains]:
-    """Blocks of draws from x [chain, d], the warm-up's among them, without end."""
+    """Blocks of draws from x [chain, d], the warm-up's among them, without end.
+
+    Raises:
+        ValueError: the log likelihood is NumPy's alone.
+    """
     whitener = np.linalg.inv(guide.factor)
 
     def jumps(first: np.ndarray | None) -> Jumps:
@@ -190,7 +194,13 @@ def _blocks(
 
     with kept_compilations():  # later blocks compile nothing
         last = [_begin(*one, warmup=warmup) for one in zip(y, seeds, strict=True)]
-        first = block(list(start))
+        try:
+            first = block(list(start))
+        except jax.errors.TracerArrayConversionError as error:
+            raise ValueError(
+                "'nuts' needs a surrogate whose log_likelihood takes arrays of JAX, too, as those "
+                "with u.__array_namespace__() do; sample with 'emcee' or 'quadrature'"
+            ) from error
     yield first
     while True:
         yield block([None] * len(start))

@@ -5,7 +5,7 @@ from .compute import Compute as Compute
 from .compute import open_compute as open_compute
 from .executors import Workers as Workers
 from .executors import open_executor as open_executor
-from .job import Batched as Batched
+from .job import BatchSimulator as BatchSimulator
 from .job import Job as Job
 from .job import OneByOne as OneByOne
 from .job import columns as columns

@@ -17,8 +17,8 @@ class Compute:
     takes longer is a failed one.
 
     Attributes:
-        executor: Simulates each job in a call of its own; a pool as many as `Batched.together`
-            says; None simulates in this process.
+        executor: Simulates each job in a call of its own; a pool as many as
+            `BatchSimulator.together` says; None simulates in this process.
         timeout: Seconds that one simulation may take, those of one call together as many times
             as long; None sets no limit.
         batch: Simulations in one call of the simulator, and kept together, where there is no

@@ -70,7 +70,7 @@ def columns(
 
 
 @dataclass(frozen=True)
-class Batched:
+class BatchSimulator:
     """A simulator of batches, and how it is best called.
 
     Attributes:
@@ -107,7 +107,7 @@ class OneByOne:
 
     Attributes:
         simulate: Callable (theta: name -> float, seed) -> signal [*signal_shape].
-        time_limit: See `Batched`.
+        time_limit: See `BatchSimulator`.
     """
 
     simulate: SingleSimulator
@@ -132,12 +132,12 @@ def batched(
     vectorised: bool = True,
     together: int = 1,
     time_limit: Limit | None = None,
-) -> Batched | OneByOne:
+) -> BatchSimulator | OneByOne:
     """What a user gives as one that the engine calls; what is one already stays."""
-    if isinstance(simulate, Batched | OneByOne):
+    if isinstance(simulate, BatchSimulator | OneByOne):
         return simulate
     if vectorised:
-        return Batched(cast(Simulator, simulate), together, time_limit)
+        return BatchSimulator(cast(Simulator, simulate), together, time_limit)
     return OneByOne(cast(SingleSimulator, simulate), time_limit)
 
 
@@ -199,7 +199,7 @@ def run_batch(
     timeout: float | None = None,
 ) -> list[Simulation]:
     """Simulate all jobs in one call; in several where they name other parameters than those of
-    which `Batched.neutral` has the values that change nothing.
+    which `BatchSimulator.neutral` has the values that change nothing.
 
     An exception, taking too long, or returning other than one signal per job costs only the run
     to blame: the batch is then repeated one by one. Seconds are shared out evenly.
@@ -208,7 +208,7 @@ def run_batch(
         shape: Of one signal; None accepts any.
         timeout: Seconds per job that the call may take, see `within`.
     """
-    neutral = simulate.neutral if isinstance(simulate, Batched) else {}
+    neutral = simulate.neutral if isinstance(simulate, BatchSimulator) else {}
     named = [frozenset(job.theta.keys() - neutral.keys()) for job in batch]
     if len(set(named)) > 1:
         found: dict[int, Simulation] = {}
@@ -267,7 +267,7 @@ def misshapen(
 
 def limit_of(simulate: object) -> Limit | None:
     """How a simulator stops itself; None if it does not."""
-    return simulate.time_limit if isinstance(simulate, Batched | OneByOne) else None
+    return simulate.time_limit if isinstance(simulate, BatchSimulator | OneByOne) else None
 
 
 def within[R](timeout: float | None, call: Callable[[], R], limit: Limit | None = None) -> R:

@@ -13,7 +13,7 @@ from .bank import Simulation, SimulationBank
 from .compute import Compute
 from .executors import is_pool, killed_its_worker
 from .failures import FailureKind, NoSignals, is_unusable, raised, unusable
-from .job import BATCH, Batched, Job, OneByOne, of_one_shape, run_batch
+from .job import BATCH, BatchSimulator, Job, OneByOne, of_one_shape, run_batch
 
 POLL_SECONDS = 0.2  # seconds between looks at what somebody else is simulating
 
@@ -150,7 +150,7 @@ class Runner:
         call takes nearly as long; elsewhere one, for a worker may die alone, and a call with it."""
         if self.executor is None:
             return 1 if isinstance(self.simulate, OneByOne) else max(count, 1)
-        if isinstance(self.simulate, Batched) and is_pool(self.executor):
+        if isinstance(self.simulate, BatchSimulator) and is_pool(self.executor):
             return self.simulate.together
         return 1
 

@@ -22,7 +22,7 @@ from .success import RunOutcomes
 class TrainingData(NamedTuple):
     """Successful simulations, as a family measured them."""
 
-    observed: np.ndarray  # [*signal_shape]
+    observed: Any  # as `Family.view` returned it
     u: np.ndarray  # [n, d], prior quantiles
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n]
@@ -122,26 +122,29 @@ class Family(Protocol):
     """How runs are compared with what was observed, and what is learned of them.
 
     Attributes:
+        name: Kept with the results; where it is empty that of the class is.
         acquisition: Name of the rule that chooses where nobody says which.
         replicates: Whether some points are simulated twice, to show run-to-run noise.
     """
 
+    name: ClassVar[str] = ""
     acquisition: ClassVar[str] = "draws"
     replicates: ClassVar[bool] = False
 
-    def learn(self, data: TrainingData, key: jax.Array) -> Surrogate:
-        """The surrogate on which a fit rests; `key` fixes what is random."""
+    def learn(self, data: TrainingData, key: np.ndarray) -> Surrogate:
+        """The surrogate on which a fit rests.
+
+        Args:
+            data: Of three simulations at least.
+            key: Fixes what is random: a key of JAX as two words, uint32 [2], which
+                `np.random.default_rng` takes as a seed, too.
+        """
         ...
 
-    def search(self, data: TrainingData, key: jax.Array, previous: Any) -> Surrogate:
+    def search(self, data: TrainingData, key: np.ndarray, previous: Any) -> Surrogate:
         """The surrogate to search with; `previous` was learned from the first of these data, or is
         None."""
         return self.learn(data, key)
-
-    @property
-    def name(self) -> str:
-        """Kept with the results."""
-        return type(self).__name__
 
     @property
     def any_shape(self) -> bool:
@@ -152,7 +155,7 @@ class Family(Protocol):
         """The observed output, float64.
 
         Raises:
-            ValueError: it cannot be learned from.
+            ValueError: it is missing, or no numbers.
         """
         if observed is None:
             raise ValueError(
@@ -164,7 +167,15 @@ class Family(Protocol):
             raise ValueError("observed must not be infinite; NaN is a missing sample")
         return array
 
-    def measure(self, observed: np.ndarray, signals: Sequence[np.ndarray | None]) -> Measured:
+    def view(self, observed: np.ndarray) -> Any:
+        """What the family makes of the observed output, once, for `measure` and `learn`.
+
+        Raises:
+            ValueError: it cannot be learned from.
+        """
+        return observed
+
+    def measure(self, observed: Any, signals: Sequence[np.ndarray | None]) -> Measured:
         """Features and discrepancies of n signals, None where a run failed: here the values of
         each, and the sum of their squared differences to what was observed."""
         features = np.full((len(signals), observed.size), np.nan)

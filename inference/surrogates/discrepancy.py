@@ -4,9 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
-import jax
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..arguments import check_callable
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
@@ -20,6 +18,7 @@ from ..gp.process import (
     predict,
 )
 from ..types import Discrepancy
+from . import warnings
 from .base import Family, Measured, TrainingData
 from .processes import OfProcesses
 from .squared_difference import MIN_FREEDOM, evaluate, independent, numbers, squared_difference
@@ -33,15 +32,6 @@ from .threshold import (
     matched,
 )
 from .transform import Transform, candidates, check_transform
-from .warnings import (
-    EQUAL,
-    GUESSED,
-    LOW_THRESHOLD,
-    NEGATIVE,
-    NOISY,
-    complaints,
-    distance_warnings,
-)
 
 BETWEEN = 0.25  # of the least simulated discrepancy: the least that is taken for its minimum
 MIN_RESOLUTION = 1e-4  # of the spread of g(Delta)
@@ -168,13 +158,13 @@ class DiscrepancySurrogate(OfProcesses):
     def warnings(self, *, confirmed: bool = False) -> list[str]:
         """Warnings of the process's errors, unless it is confirmed, and of what was compared."""
         if self.equal:
-            return [EQUAL]
+            return [warnings.EQUAL]
         said = [*self.said]
         if not confirmed:
-            said += complaints(self.checks()["loo_z"], "discrepancy")
+            said += warnings.complaints(self.checks()["loo_z"], "discrepancy")
         if self.noisy:
-            said.append(NOISY)
-        return said if self.fits else [*said, LOW_THRESHOLD]
+            said.append(warnings.NOISY)
+        return said if self.fits else [*said, warnings.LOW_THRESHOLD]
 
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
         """One new discrepancy for each row of u [n, d]."""
@@ -189,13 +179,14 @@ def learn(
     transform: str | None = None,
     previous: DiscrepancySurrogate | None = None,
     normal: np.ndarray | None = None,
+    rule: Threshold = None,
 ) -> DiscrepancySurrogate:
     """Fit the surrogate.
 
     A run that blew up is learned as the worst of the others: the process need not follow it, but
     shall know that it is bad there. Of the transforms identity, sqrt and log the one with the
     highest leave-one-out log predictive density of the discrepancy itself (Jacobian included)
-    is taken, unless given. The threshold is that of the default rule, see `with_threshold`.
+    is taken, unless given.
 
     Args:
         u: Prior quantiles [n, d].
@@ -204,20 +195,17 @@ def learn(
         previous: Learned from the first of these data; its hyperparameters are kept until the
             data have grown by GROWTH, its transform until they have by TRANSFORM_GROWTH.
         normal: Which parameters the kernel sees as normal scores [d], see `gp.process.coordinates`.
+        rule: See `with_threshold`.
 
     Raises:
-        ValueError: bad transform.
+        ValueError: bad transform, or undefined at the given threshold.
     """
     values = np.minimum(discrepancy, discrepancy[~is_outlier(discrepancy)].max())
     n = len(u)
     with np.errstate(divide="ignore", invalid="ignore"):  # where the transform is undefined
-        old = previous is not None and np.isfinite(previous.scale(values)).all()
-    if (
-        previous is not None
-        and old
-        and not previous.equal
-        and n < TRANSFORM_GROWTH * previous.chosen_at
-    ):
+        fits = previous is not None and np.isfinite(previous.scale(values)).all()
+    grown = previous is None or n >= TRANSFORM_GROWTH * previous.chosen_at
+    if previous is not None and fits and not (grown or previous.equal):
         data = Data(u, previous.scale(values)[None], normal)
         hyper, learned_at = previous.gp.hyper, previous.learned_at
         if n >= GROWTH * learned_at:
@@ -225,13 +213,14 @@ def learn(
         learned = DiscrepancySurrogate(
             condition(hyper, data), previous.scale, values, np.nan, learned_at, previous.chosen_at
         )
-        return with_threshold(learned, None)
+        return with_threshold(learned, rule)
     options = [_standardise(option, values) for option in candidates(transform, values)]
-    fitted = [_fit(Data(u, scale(values)[None], normal)) for scale in options]
+    every = [Data(u, scale(values)[None], normal) for scale in options]
+    fitted = [condition(maximum_a_posteriori(data), data) for data in every]
     scores = [_score(gp, scale, values) for gp, scale in zip(fitted, options, strict=True)]
     best = int(np.argmax(scores))
     chosen = DiscrepancySurrogate(fitted[best], options[best], values, np.nan, n, n)
-    return with_threshold(chosen, None)
+    return with_threshold(chosen, rule)
 
 
 def is_outlier(discrepancy: np.ndarray) -> np.ndarray:
@@ -241,10 +230,6 @@ def is_outlier(discrepancy: np.ndarray) -> np.ndarray:
     finite = deviation[np.isfinite(deviation)]
     spread = np.quantile(finite, BEST_SHARE) if finite.size else 0.0
     return (deviation / MAX_DEVIATIONS > spread) & (spread != 0.0)
-
-
-def _fit(data: Data) -> GP:
-    return condition(maximum_a_posteriori(data), data)
 
 
 def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> DiscrepancySurrogate:
@@ -311,6 +296,7 @@ class DiscrepancyFamily(Family):
             `threshold.choose_threshold`.
     """
 
+    name: ClassVar[str] = "discrepancy"
     acquisition: ClassVar[str] = "cautious"
 
     discrepancy: Discrepancy | None = None
@@ -323,18 +309,13 @@ class DiscrepancyFamily(Family):
         check_transform(self.transform)
 
     @property
-    def name(self) -> str:
-        return "discrepancy"
-
-    @property
     def any_shape(self) -> bool:
         return self.discrepancy is not None
 
-    def observe(self, observed: ArrayLike | None) -> np.ndarray:
-        array = super().observe(observed)
+    def view(self, observed: np.ndarray) -> np.ndarray:
         if self.discrepancy is None:
-            squared_difference()(array, array)  # raises if it cannot be used
-        return array
+            squared_difference()(observed, observed)  # raises if it cannot be used
+        return observed
 
     def measure(self, observed: np.ndarray, signals: Sequence[np.ndarray | None]) -> Measured:
         """Features are the signal, NaN where it has another shape than what was observed."""
@@ -343,28 +324,27 @@ class DiscrepancyFamily(Family):
         return Measured(features, *evaluate(distance, observed, signals))
 
     def search(
-        self, data: TrainingData, key: jax.Array, previous: DiscrepancySurrogate | None
+        self, data: TrainingData, key: np.ndarray, previous: DiscrepancySurrogate | None
     ) -> DiscrepancySurrogate:
         """Errors count as independent, lest a poor start leave it undecided."""
         return self._learn(data, previous, self._rule(data, numbers))
 
-    def learn(self, data: TrainingData, key: jax.Array) -> DiscrepancySurrogate:
+    def learn(self, data: TrainingData, key: np.ndarray) -> DiscrepancySurrogate:
         rule = self._rule(data, independent)
-        said = () if rule is not None else (GUESSED,)
+        said = () if rule is not None else (warnings.GUESSED,)
         if self.threshold is None and data.discrepancy.min() < 0.0:
-            said = (NEGATIVE,)
+            said = (warnings.NEGATIVE,)
         if self.discrepancy is None:
             order = np.argsort(data.discrepancy)
             outputs = data.features[order].reshape(-1, *data.observed.shape)
-            said += tuple(distance_warnings(data.observed, outputs))
+            said += tuple(warnings.distance_warnings(data.observed, outputs))
         return replace(self._learn(data, None, rule).cautious, said=said)
 
     def _learn(
         self, data: TrainingData, previous: DiscrepancySurrogate | None, rule: Threshold
     ) -> DiscrepancySurrogate:
-        learned = learn(data.u, data.discrepancy, self.transform, previous, data.normal)
-        learned = replace(learned, success=learn_success(data.runs, data.normal))
-        return learned if rule is None else with_threshold(learned, rule)
+        learned = learn(data.u, data.discrepancy, self.transform, previous, data.normal, rule)
+        return replace(learned, success=learn_success(data.runs, data.normal))
 
     def _rule(self, data: TrainingData, number: Callable[[np.ndarray], float]) -> Threshold:
         """The threshold that was given, or the one that fits the residual of the closest run."""

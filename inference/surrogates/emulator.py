@@ -361,7 +361,7 @@ def predict(emulator: Emulator, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     constant = np.sum(remainder.factors**2, 1) + remainder.white
     constant = constant + np.sum((basis.vectors @ emulator.noise) * basis.vectors, 1)
     sd = np.sqrt(variance @ basis.vectors.T**2 + _spread(emulator, u)[:, None] * constant)
-    return basis.centre + basis.scale * (mean @ basis.vectors.T), basis.scale * sd
+    return _outputs(basis, mean.T), basis.scale * sd
 
 
 def predictive_draws(rng: np.random.Generator, emulator: Emulator, u: np.ndarray) -> np.ndarray:

@@ -41,19 +41,6 @@ class GivenNoise(NamedTuple):
         )
 
 
-class NoiseModel(NamedTuple):
-    """The noise between the simulator and the data.
-
-    Attributes:
-        given: The measurement noise; None where it is unknown.
-        misfit: Prior probability that the data are missed by more than the given noise explains;
-            0 for none.
-    """
-
-    given: GivenNoise | None
-    misfit: float
-
-
 def check_noise(noise: ArrayLike | Covariance) -> None:
     """Raise ValueError for what is never a noise; its shape is looked at beside the output's."""
     if not isinstance(noise, Covariance):

@@ -2,9 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
-import jax
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtr, ndtri
@@ -294,9 +293,7 @@ class LogLikelihoodFamily(Family):
     -inf is where the data are impossible. Nothing is observed beside.
     """
 
-    @property
-    def name(self) -> str:
-        return "log_likelihood"
+    name: ClassVar[str] = "log_likelihood"
 
     @property
     def any_shape(self) -> bool:
@@ -324,7 +321,7 @@ class LogLikelihoodFamily(Family):
         return Measured(found[:, 1:], -found[:, 0], errors)
 
     def search(
-        self, data: TrainingData, key: jax.Array, previous: LogLikelihoodSurrogate | None
+        self, data: TrainingData, key: np.ndarray, previous: LogLikelihoodSurrogate | None
     ) -> LogLikelihoodSurrogate:
         """Optimistic: where a run was unlucky others are to be made."""
         values, sd = -data.discrepancy, data.features[:, 0]
@@ -332,7 +329,7 @@ class LogLikelihoodFamily(Family):
         success = learn_success(data.runs, data.normal)
         return replace(learned, level=learned.level._replace(success=success))
 
-    def learn(self, data: TrainingData, key: jax.Array) -> LogLikelihoodSurrogate:
+    def learn(self, data: TrainingData, key: np.ndarray) -> LogLikelihoodSurrogate:
         return self.search(data, key, None).cautious
 
 

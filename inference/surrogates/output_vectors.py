@@ -127,23 +127,12 @@ def describe(observed: np.ndarray, summary: Summary | None) -> Output:
     index = np.arange(summarised.size).reshape(summarised.shape)
     index = np.moveaxis(index, 0, -1).ravel() if series else index.ravel()
     present = index[finite.ravel()[index]]
-    layout = _positions(summarised.shape, present, series)
-    block = -(-len(present) // MAX_VALUES) if series else 1
-    starts = _block_starts(layout, block)
-    layout = Layout(layout.channel[starts], layout.sample[starts] // block)
+    channel, sample, block = np.zeros(len(present), int), np.arange(len(present)), 1
+    if series:
+        channels, block = int(np.prod(summarised.shape[1:])), -(-len(present) // MAX_VALUES)
+        channel = np.unique(present % channels, return_inverse=True)[1]
+        sample = present // channels // block
+    new = (np.diff(channel, prepend=-1) != 0) | (np.diff(sample, prepend=-1) != 0)
+    starts = np.flatnonzero(new)  # of samples of one channel and one block of time
+    layout = Layout(channel[starts], sample[starts])
     return Output(summary, summarised.shape, present, layout, starts, series)
-
-
-def _positions(shape: tuple[int, ...], present: np.ndarray, series: bool) -> Layout:
-    if not series:
-        return Layout(np.zeros(len(present), int), np.arange(len(present)))
-    channels = int(np.prod(shape[1:]))
-    channel, used = present % channels, present // channels
-    return Layout(np.unique(channel, return_inverse=True)[1], used)
-
-
-def _block_starts(layout: Layout, block: int) -> np.ndarray:
-    """First rows of runs of samples of one channel and one block of time."""
-    key = layout.sample // block
-    new = (np.diff(layout.channel, prepend=-1) != 0) | (np.diff(key, prepend=-1) != 0)
-    return np.flatnonzero(new)

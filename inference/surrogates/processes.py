@@ -1,33 +1,14 @@
 """What surrogates share that rest on Gaussian processes."""
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from ..gp.optimise import surely_least
 from ..gp.process import GP, resolved
+from ..types import LogLikelihood
 from .base import Surrogate
 from .success import log_success
-
-
-class ProcessLikelihood(Protocol):
-    """A named tuple of arrays, among them `doubt`, the part of the latent variance that counts."""
-
-    @property
-    def success(self) -> GP | None:
-        """Where runs succeed, see `success.learn_success`; None is everywhere."""
-        ...
-
-    def __call__(self, u: Any, /) -> Any:
-        """Log likelihood [n] at u [n, d]."""
-        ...
-
-    def second_moment(self, u: np.ndarray, spread: np.ndarray | None) -> np.ndarray:
-        """log E[L(u)^2] [n], over a latent mean that varies with the processes' variance; or
-        [n, ...] with the variance `spread` [n, ..., k]."""
-        ...
-
-    def _replace(self, **parts: Any) -> "ProcessLikelihood": ...
 
 
 class OfProcesses(Surrogate):
@@ -39,7 +20,13 @@ class OfProcesses(Surrogate):
         raise NotImplementedError
 
     @property
-    def log_likelihood(self) -> ProcessLikelihood:  # pyright: ignore  nobody sets it
+    def log_likelihood(self) -> Any:  # pyright: ignore  nobody sets it
+        """A named tuple of arrays that is called with u [n, d].
+
+        Among its fields are `success` (see `learn_success`) and `doubt`, the part of the latent
+        variance that counts. Its method `second_moment(u, spread)` is log E[L(u)^2] [n] over
+        latent values that vary with their variance, or [n, ...] with `spread` [n, ..., k].
+        """
         raise NotImplementedError
 
     @property
@@ -47,7 +34,7 @@ class OfProcesses(Surrogate):
         return self.gp.data.u
 
     @property
-    def sure(self) -> ProcessLikelihood:
+    def sure(self) -> LogLikelihood:
         return self.log_likelihood._replace(doubt=np.zeros(()))
 
     def best(self) -> np.ndarray:

@@ -2,9 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
-import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -15,6 +14,7 @@ from ..gp.process import GP, fantasize
 from ..simulations.failures import Failure, not_finite
 from ..sobol import sobol
 from ..types import Discrepancy
+from . import warnings
 from .base import Family, Measured, TrainingData
 from .emulator import (
     PREDICTED_SHARE,
@@ -31,7 +31,7 @@ from .emulator import (
     resized,
     smallest_misfit,
 )
-from .given_noise import Covariance, GivenNoise, NoiseModel, check_noise, given_noise
+from .given_noise import Covariance, GivenNoise, check_noise, given_noise
 from .measurement_noise import (
     CORRELATIONS,
     FEW_CORRELATIONS,
@@ -60,21 +60,6 @@ from .processes import OfProcesses
 from .signal_likelihood import SignalLikelihood, likelihood_of, node_log_densities
 from .squared_difference import MIN_FREEDOM, evaluate, failed_on, sum_of_squares
 from .success import learn_success
-from .warnings import (
-    EQUAL,
-    FALSE_ALARMS,
-    FEW_NUMBERS,
-    GENEROUS,
-    MISFIT,
-    OUTSIDE,
-    SMOOTH,
-    TOO_FAST,
-    UNPREDICTED,
-    complaints,
-    noise_warnings,
-    range_warnings,
-    unreached_warnings,
-)
 
 KEPT_NODES = 12  # nodes of unknown measurement noise that enter the likelihood
 SCREENED_POINTS = 128
@@ -136,8 +121,7 @@ class SignalSurrogate(OfProcesses):
             remainder = Remainder(np.sqrt(share) * factors, share * white)
             noise = share * self.emulator.noise
             emulator = self.emulator._replace(noise=noise, remainder=remainder)
-            known = NoiseModel(self.known, 0.0)
-            found = observe(emulator, self.output, self.observed, known, previous=self)
+            found = observe(emulator, self.output, self.observed, self.known, 0.0, self)
             found = replace(found, box=self.box, success=self.success)
         return found.log_likelihood._replace(doubt=np.zeros(()))
 
@@ -216,26 +200,26 @@ class SignalSurrogate(OfProcesses):
         repeats, sized = self.emulator.repeats, self.emulator.size is not None
         if self.emulator.basis.used == 0 and not sized:
             if self.emulator.equal:
-                return [EQUAL, *self._of_data()]
+                return [warnings.EQUAL, *self._of_data()]
             fast = len(repeats) and not repeats.any()
-            return [TOO_FAST if fast else UNPREDICTED, *self._of_data()]
-        said = [] if confirmed else complaints(loo_errors(self.emulator), "output")
-        said += noise_warnings(noise_share(self.emulator), repeats, sized)
+            return [warnings.TOO_FAST if fast else warnings.UNPREDICTED, *self._of_data()]
+        said = [] if confirmed else warnings.complaints(loo_errors(self.emulator), "output")
+        said += warnings.noise_warnings(noise_share(self.emulator), repeats, sized)
         if self._outside():
-            said.append(OUTSIDE)
+            said.append(warnings.OUTSIDE)
         elif self._missed():
-            said.append(MISFIT)
+            said.append(warnings.MISFIT)
         elif self._smooth():
-            said.append(SMOOTH)
+            said.append(warnings.SMOOTH)
         elif self._generous():
-            said.append(GENEROUS)
+            said.append(warnings.GENEROUS)
         if self.known is None and len(self.observed) - self.u.shape[1] < MIN_FREEDOM:
-            said.append(FEW_NUMBERS)
+            said.append(warnings.FEW_NUMBERS)
         return said + self._of_data()
 
     def _of_data(self) -> list[str]:
         """Warnings of the observed values themselves."""
-        ranges = range_warnings(self.scale.observed) if self.known is None else []
+        ranges = warnings.range_warnings(self.scale.observed) if self.known is None else []
         return ranges + self.unreached
 
     @property
@@ -243,7 +227,7 @@ class SignalSurrogate(OfProcesses):
         """That an emulated number lies beyond all simulated ones, if it does."""
         values = self.scale.observed
         noise = float(self.scale.sds(values[None])[0, 0])
-        return unreached_warnings(values, self.scale.back(self.emulator.outputs), noise)
+        return warnings.unreached_warnings(values, self.scale.back(self.emulator.outputs), noise)
 
     def _missed(self) -> bool:
         """Whether the given noise does not explain what was observed."""
@@ -256,7 +240,7 @@ class SignalSurrogate(OfProcesses):
         if not even or known is None or known.factors.size or not known.white.all():
             return False
         least = np.min((self.emulator.outputs - self.observed) ** 2 @ (1.0 / known.white))
-        return bool(least < stats.chi2.ppf(FALSE_ALARMS, freedom))
+        return bool(least < stats.chi2.ppf(warnings.FALSE_ALARMS, freedom))
 
     def _smooth(self) -> bool:
         """Whether the noise that was found varies as slowly as a signal, and is most of what no
@@ -310,7 +294,8 @@ def observe(
     emulator: Emulator,
     output: Output,
     observed: np.ndarray,
-    noise: NoiseModel,
+    given: GivenNoise | None,
+    misfit: float,
     previous: SignalSurrogate | None = None,
 ) -> SignalSurrogate:
     """Compare with the observed values [m].
@@ -320,18 +305,19 @@ def observe(
     nothing would explain what no run explains.
 
     Args:
-        noise: What is known of it.
+        given: The measurement noise; None where it is unknown.
+        misfit: Prior probability that the data are missed by more than it explains; 0 for none.
         previous: Its nodes are kept.
     """
     basis, remainder = emulator.basis, emulator.remainder
-    target, given = basis.standardise(observed), noise.given
+    target = basis.standardise(observed)
     vectors, factors = basis.vectors, remainder.factors
     white = np.full(len(target), remainder.white)
     if given is not None:
         white = white + given.white / basis.scale**2
         factors = np.column_stack([factors, given.factors / basis.scale[:, None]])
     kept = None if previous is None else (previous.nodes, previous.log_prior)
-    nodes, log_weight = kept or _nodes(emulator, output, observed, noise)
+    nodes, log_weight = kept or _nodes(emulator, output, observed, given, misfit)
     if emulator.equal:  # nothing to compare
         reduced = Reduced(*(np.zeros((len(log_weight), *[0] * axes)) for axes in (1, 2, 0, 0, 0)))
     else:
@@ -350,18 +336,22 @@ def observe(
 
 
 def _nodes(
-    emulator: Emulator, output: Output, observed: np.ndarray, noise: NoiseModel
+    emulator: Emulator,
+    output: Output,
+    observed: np.ndarray,
+    given: GivenNoise | None,
+    misfit: float,
 ) -> tuple[Nodes, np.ndarray]:
     """Sizes and correlations that the unknown noise or misfit may have, and their log weights."""
-    if emulator.equal or (noise.given is not None and not noise.misfit):
+    if emulator.equal or (given is not None and not misfit):
         return NO_MEASUREMENT_NOISE, np.zeros(1)
     basis = emulator.basis
     correlations = FEW_CORRELATIONS if output.series else NO_CORRELATION
     miss = smallest_misfit(emulator, observed, _screen(emulator, MISFIT_POINTS))
     low, high = LEAST_OF_MISFIT * miss, MOST_OF_NOISE * miss
-    if noise.given is not None:
-        sd = float(np.sqrt(np.mean(noise.given.variance / basis.scale**2)))
-        return with_misfit(candidates(low, MOST * miss, correlations), sd, noise.misfit)
+    if given is not None:
+        sd = float(np.sqrt(np.mean(given.variance / basis.scale**2)))
+        return with_misfit(candidates(low, MOST * miss, correlations), sd, misfit)
     if output.long:
         left = residual_size(basis.standardise(observed), basis.vectors[:, : basis.used])
         low, high, correlations = LEAST_OF_RESIDUAL * left, MOST * max(left, miss), CORRELATIONS
@@ -396,6 +386,14 @@ def _screen(emulator: Emulator, count: int) -> np.ndarray:
     return np.concatenate([sobol(0, 0, count, data.shape[1]), data])
 
 
+class ObservedOutput(NamedTuple):
+    """What was observed, how outputs become values, and on which scale these are emulated."""
+
+    observed: np.ndarray  # [*signal_shape]
+    output: Output
+    scale: OutputScale
+
+
 @dataclass(frozen=True, eq=False)
 class SignalFamily(Family):
     """Principal components of the output, a Gaussian process for each score.
@@ -423,6 +421,7 @@ class SignalFamily(Family):
             blew up.
     """
 
+    name: ClassVar[str] = "signal"
     replicates: ClassVar[bool] = True
 
     summary: Summary | None = None
@@ -446,33 +445,23 @@ class SignalFamily(Family):
             checked_number("predicted", self.predicted, lambda share: 0.0 <= share < 1.0, due)
 
     @property
-    def name(self) -> str:
-        return "signal"
-
-    @property
     def any_shape(self) -> bool:
         return self.summary is not None
 
-    def observe(self, observed: ArrayLike | None) -> np.ndarray:
-        array = super().observe(observed)
-        self.view(array)  # raises if it cannot be used
-        return array
-
-    def view(self, observed: np.ndarray) -> tuple[Output, OutputScale]:
-        """How outputs become values, and the scale on which those are emulated."""
+    def view(self, observed: np.ndarray) -> ObservedOutput:
         output = describe(observed, self.summary)
         values, law = output.values(observed), law_of(self.noise)
         if law is not None:
-            return output, ByMean(law, values, output.counts)
+            return ObservedOutput(observed, output, ByMean(law, values, output.counts))
         given = None if self.noise is None else given_noise(self.noise, output)  # pyright: ignore[reportArgumentType]  no function is left
-        return output, Plain(values, given)
+        return ObservedOutput(observed, output, Plain(values, given))
 
-    def measure(self, observed: np.ndarray, signals: Sequence[np.ndarray | None]) -> Measured:
+    def measure(self, observed: ObservedOutput, signals: Sequence[np.ndarray | None]) -> Measured:
         """Features are the output's values."""
-        output, scale = self.view(observed)
+        array, output, scale = observed
         named = "summary" if self.discrepancy is None else "discrepancy"
         distance = self.discrepancy or self._of_summaries
-        discrepancy, errors = evaluate(distance, observed, signals, named)
+        discrepancy, errors = evaluate(distance, array, signals, named)
         features = np.full((len(signals), len(scale.observed)), np.nan)
         for i, signal in enumerate(signals):
             if signal is None or not np.isfinite(discrepancy[i]):
@@ -481,11 +470,11 @@ class SignalFamily(Family):
             try:
                 features[i] = output.values(signal)
             except (Exception, SystemExit) as error:  # of the user's summary
-                errors[i] = failed_on("summary", signal, observed, error)
+                errors[i] = failed_on("summary", signal, array, error)
             try:
                 scale.check(features[i])
             except (Exception, SystemExit) as error:  # of the user's function of the mean
-                errors[i], features[i] = failed_on("noise", signal, observed, error), np.nan
+                errors[i], features[i] = failed_on("noise", signal, array, error), np.nan
         failed = ~np.isfinite(features).all(1)
         return Measured(features, np.where(failed, np.nan, discrepancy), errors)
 
@@ -501,13 +490,13 @@ class SignalFamily(Family):
         finite = bool(np.isfinite(values).all())
         return None if finite else not_finite(f"summary returns {infinities(values)}")
 
-    def learn(self, data: TrainingData, key: jax.Array) -> SignalSurrogate:
+    def learn(self, data: TrainingData, key: np.ndarray) -> SignalSurrogate:
         return self.search(data, key, None)
 
     def search(
-        self, data: TrainingData, key: jax.Array, previous: SignalSurrogate | None
+        self, data: TrainingData, key: np.ndarray, previous: SignalSurrogate | None
     ) -> SignalSurrogate:
-        output, scale = self.view(data.observed)
+        _, output, scale = data.observed
         if previous is not None and goes_on(previous.emulator, previous.scale.of(data.features)):
             scale = previous.scale
         else:
@@ -520,8 +509,7 @@ class SignalFamily(Family):
         def compared(at: np.ndarray | None) -> SignalSurrogate:
             """With what was observed, its noise being right around the features `at` [m]."""
             seen, given = scale.seen(at)
-            noise = NoiseModel(given, self.misfit)
-            found = observe(emulator, output, seen, noise, previous)
+            found = observe(emulator, output, seen, given, self.misfit, previous)
             return replace(found, success=success, scale=scale)
 
         found = compared(None)

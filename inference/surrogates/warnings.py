@@ -149,10 +149,11 @@ def complaints(loo_z: np.ndarray, what: str) -> list[str]:
             "deviations: it is not Gaussian, or changes faster than the emulator predicts; "
             "simulate more, or choose a summary or transform that behaves better"
         )
-    if _too_large(loo_z, OVERCONFIDENT_SQUARE):
+    square = np.mean(loo_z**2)
+    if square > max(OVERCONFIDENT_SQUARE, stats.chi2.isf(FALSE_ALARMS, count) / count):
         said.append(
-            f"leave-one-out errors of the {what} are {np.sqrt(np.mean(loo_z**2)):.1f} times what "
-            "the emulator predicts; simulate more"
+            f"leave-one-out errors of the {what} are {np.sqrt(square):.1f} times what the emulator "
+            "predicts; simulate more"
         )
     return said
 
@@ -178,12 +179,6 @@ def noise_warnings(share: float, repeats: np.ndarray, sized: bool) -> list[str]:
     ]
 
 
-def _too_large(errors: np.ndarray, matters: float) -> bool:
-    """Whether the mean square of studentised errors exceeds both `matters` and chance."""
-    count = errors.size
-    return bool(np.mean(errors**2) > max(matters, stats.chi2.isf(FALSE_ALARMS, count) / count))
-
-
 def history_warnings(history: History) -> list[str]:
     """Warnings if most simulations failed, or if equal seeds gave unlike signals."""
     told, succeeded = len(history.theta), int(history.succeeded.sum())
@@ -191,10 +186,9 @@ def history_warnings(history: History) -> list[str]:
     contradicting = history.contradicting
     said = []
     if failed > FAILED_SHARE * told:
-        last = [error for error in history.errors if error][-1]
         said.append(
             f"{failed} of {told} simulations failed: the fit rests on {succeeded}; the last "
-            f"error: {last}"
+            f"error: {history.last_error}"
         )
     if contradicting:
         said.append(

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from bolfi_liquids.inference.surrogates import Family, Surrogate
-from bolfi_liquids.inference.surrogates.base import TrainingData
+from bolfi_liquids.inference.surrogates import Family, Surrogate, TrainingData
 
 RIDGE = 1e-6  # prior precision of the coefficients
 
@@ -79,7 +78,7 @@ class QuadraticSurface(Family):
 
     noise: float = 0.1
 
-    def learn(self, data: TrainingData, key: Any) -> QuadraticSurrogate:
+    def learn(self, data: TrainingData, key: np.ndarray) -> QuadraticSurrogate:
         at, inverse = terms(data.u), precision(data.u)
         coefficients = inverse @ at.T @ data.features
         left = data.features - at @ coefficients

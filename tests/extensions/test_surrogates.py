@@ -69,6 +69,10 @@ def family(request):
 
 @pytest.fixture(scope="module")
 def fit(family):
+    return fitted(family)
+
+
+def fitted(family):
     u = sobol(0, 0, RUNS, len(PRIOR))
     signals, data = simulate(PRIOR.from_unit(u), range(RUNS)), OBSERVED
     if family.name == "log_likelihood":
@@ -200,6 +204,18 @@ def test_a_surrogate_keeps_its_protocol(learned, member):
     globals()[f"check_{member}"](learned)
 
 
+def test_a_surrogate_that_ignores_pending_points_is_noticed():
+    learned = fitted(example()).learned
+
+    class Stubborn(type(learned)):
+        def fantasize(self, u):
+            return self
+
+    with pytest.raises(AssertionError):
+        check_fantasize(Stubborn(learned.u, learned.log_likelihood))
+    check_fantasize(learned)
+
+
 def test_the_engines_own_tell_of_themselves(learned):
     if isinstance(learned, OfProcesses):
         assert learned.constants() and learned.described()
@@ -223,9 +239,10 @@ def test_every_rule_chooses_by_it(learned, rule):
 
 def test_a_fit_rests_on_it(fit, family):
     """It is described, and sampled without a compiler."""
-    assert family.name in str(fit)
+    name = family.name or type(family).__name__
+    assert name in str(fit)
     drawn = fit.sample("quadrature", chains=2, draws=50, warn=False)
-    assert finite(drawn["posterior"]["slope"]) and drawn.attrs["surrogate"] == family.name
+    assert finite(drawn["posterior"]["slope"]) and drawn.attrs["surrogate"] == name
     assert set(drawn["emulator_checks"]) == set(fit.learned.checks())
 
 

@@ -142,7 +142,7 @@ def test_telling_nothing_changes_nothing(prior, observed):
     engine = inference.Bolfi(prior, observed)
     engine.tell({"slope": [], "offset": []}, [], [], [])
     engine.tell({"slope": [], "offset": []}, np.zeros((0, 30)))
-    assert engine.told == 0 and engine.errors == []
+    assert engine.told == 0 and engine.history.failures == {}
 
 
 def test_an_executor_that_was_shut_down_is_named(prior, observed, simulate):

@@ -139,7 +139,7 @@ def test_what_is_learned_does_not_depend_on_the_order_of_shapes(prior, observed,
     theta = engine.ask(BUDGET)
     signals = [row[: 20 + i] for i, row in enumerate(simulate(theta, range(BUDGET)))][::order]
     engine.tell({name: column[::order] for name, column in theta.items()}, signals)
-    assert engine.succeeded == BUDGET and engine.errors == []
+    assert engine.succeeded == BUDGET and engine.history.failures == {}
     objects = np.empty(BUDGET, object)
     objects[:] = signals
     other = inference.Bolfi(prior, observed, discrepancy=of_means)

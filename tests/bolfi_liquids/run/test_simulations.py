@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
-from bolfi_liquids.inference.simulations import Batched, Compute
+from bolfi_liquids.inference.simulations import BatchSimulator, Compute
 from bolfi_liquids.inference.simulations.failures import FailureKind
 
 from bolfi_liquids.run.simulations import (
@@ -31,7 +31,7 @@ class Made(FluidSimulator):
     @property
     def batched(self):
         """It does not stop itself."""
-        return Batched(self.simulate)
+        return BatchSimulator(self.simulate)
 
 
 def test_only_what_is_missing_is_simulated():

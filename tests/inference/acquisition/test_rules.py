@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference.acquisition.rules import (
     RULES,
-    best_candidates,
+    BestCandidates,
     exploration_width,
     log_moments,
     truncated_normal,
@@ -159,6 +159,11 @@ def test_regions_where_runs_fail_are_avoided():
 
 def test_scores_of_the_user_choose_among_candidates():
     surrogate = fitted()
-    best = best_candidates(lambda _, __, found: -found.u[:, 0], KEY, surrogate, 2)
+
+    class Leftmost(BestCandidates):
+        def _score(self, rng, surrogate, found):
+            return -found.u[:, 0]
+
+    best = Leftmost()(KEY, surrogate, 2)
     assert (best[0] != best[1]).any()
     assert best[:, 0].max() < 0.4  # of candidates about 0.4 to 0.6

@@ -156,6 +156,14 @@ def test_compiles_once_for_all_fits_and_lengths(line_fit, prior, observed, simul
 
 
 @pytest.mark.slow
+def test_nuts_refuses_a_likelihood_of_numpy_alone():
+    target = Target(lambda u: -0.5 * np.sum(((np.asarray(u) - 0.45) / 0.03) ** 2, 1), 2)
+    with pytest.raises(ValueError, match="'nuts' needs"):
+        sample("nuts", target, SMALL)
+    assert not sample("emcee", target).found
+
+
+@pytest.mark.slow
 def test_same_seed_same_draws():
     for sampler in sampling.SAMPLERS:
         a, b, c = (sample(sampler, gaussian(2), SMALL, seed).chains.u for seed in (0, 0, 1))

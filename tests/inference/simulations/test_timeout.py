@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 from bolfi_liquids.inference import SimulationBank
 from bolfi_liquids.inference.simulations import (
-    Batched,
+    BatchSimulator,
     Compute,
     Job,
     OneByOne,
@@ -132,7 +132,7 @@ def test_a_simulator_that_stops_itself_stays_in_its_thread(seconds, error):
     patient = Patient(seconds)
     with SimulationBank() as bank:
         (found,) = run_missing(
-            Batched(patient.simulate, time_limit=patient.time_limit),
+            BatchSimulator(patient.simulate, time_limit=patient.time_limit),
             JOBS[:1],
             Compute(bank=bank, timeout=0.1),
         )

@@ -8,7 +8,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
-from bolfi_liquids.inference.simulations import Batched, Compute, Job, run_missing
+from bolfi_liquids.inference.simulations import BatchSimulator, Compute, Job, run_missing
 from bolfi_liquids.inference.simulations.job import run_batch
 
 
@@ -28,7 +28,7 @@ def run(simulator, count, pool):
     jobs = [Job({"a": 1.0}, seed) for seed in range(count)]
     with SimulationBank() as bank:
         compute = Compute(bank=bank, executor=pool)
-        found = run_missing(Batched(simulator.simulate, 4), jobs, compute, (2,))
+        found = run_missing(BatchSimulator(simulator.simulate, 4), jobs, compute, (2,))
         assert len(bank) == count
     return found
 
@@ -52,13 +52,13 @@ def test_a_run_that_fails_costs_only_itself():
 @pytest.mark.parametrize("together", [0, 2.5, "four"])
 def test_what_is_no_number_of_simulations_is_refused(together):
     with pytest.raises(ValueError, match="together"):
-        Batched(Marching().simulate, together)
+        BatchSimulator(Marching().simulate, together)
 
 
 @pytest.mark.parametrize("neutral", [3, "drag", ["drag"]])
 def test_neutral_values_without_names_are_refused(neutral):
     with pytest.raises(ValueError, match="neutral"):
-        Batched(Marching().simulate, neutral=neutral)
+        BatchSimulator(Marching().simulate, neutral=neutral)
 
 
 def test_a_call_may_take_as_many_times_as_long_as_it_makes_simulations():
@@ -70,7 +70,7 @@ def test_a_call_may_take_as_many_times_as_long_as_it_makes_simulations():
         time.sleep(0.25 * len(seeds))
         return seeds[:, None].astype(float)
 
-    four = Batched(sleepy, 4)
+    four = BatchSimulator(sleepy, 4)
     jobs = [Job({"a": 1.0}, seed) for seed in range(4)]
     with SimulationBank() as bank, ThreadPoolExecutor(1) as pool:
         kept = Compute(bank=bank, executor=pool, timeout=0.6)
@@ -106,7 +106,7 @@ def test_a_worker_that_is_killed_loses_its_call_and_what_was_stored_is_not_repea
     (tmp_path / "mortal.py").write_text(MORTAL)
     monkeypatch.syspath_prepend(tmp_path)
     made, mended = tmp_path / "made", tmp_path / "mended"
-    simulate = Batched(importlib.import_module("mortal").Mortal(str(made), str(mended)), 4)
+    simulate = BatchSimulator(importlib.import_module("mortal").Mortal(str(made), str(mended)), 4)
     jobs = [Job({"a": 1.0}, seed) for seed in range(12)]
 
     def run_all():
@@ -143,7 +143,7 @@ MIXED = [Job({"a": 1.0, "drag": 2.0}, 0), Job({"a": 3.0}, 1), Job({"a": 5.0, "la
 
 def test_runs_of_other_parameters_share_a_call_where_the_simulator_has_their_neutral_values():
     simulator = Told()
-    batched = Batched(simulator.simulate, neutral={"drag": 0.0, "lag": -1.0})
+    batched = BatchSimulator(simulator.simulate, neutral={"drag": 0.0, "lag": -1.0})
     found = run_batch(batched, MIXED, (1,))
     assert simulator.calls == [
         {"a": [1.0, 3.0, 5.0], "drag": [2.0, 0.0, 0.0], "lag": [-1.0, -1.0, 1.0]}

@@ -64,7 +64,7 @@ def test_a_long_series_needs_no_matrix():
     """20 000 samples: as a covariance 3 GB."""
     tracemalloc.start()
     try:
-        _, scale = SignalFamily(noise=0.1).view(np.zeros(20_000))
+        scale = SignalFamily(noise=0.1).view(np.zeros(20_000)).scale
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -92,6 +92,6 @@ def test_other_noise_is_refused(prior, gappy, noise, message):
 def test_noise_that_reads_two_ways_is_refused(prior):
     observed = np.array([[1.0, np.nan], [np.nan, 2.0]])
     with pytest.raises(ValueError, match="may be sds or a covariance"):
-        SignalFamily(noise=np.full((2, 2), 0.1)).observe(observed)
-    given = SignalFamily(noise=[0.1, 0.1]).view(observed)[1].given
+        SignalFamily(noise=np.full((2, 2), 0.1)).view(observed)
+    given = SignalFamily(noise=[0.1, 0.1]).view(observed).scale.given
     np.testing.assert_allclose(given.white, 0.01)

@@ -35,10 +35,11 @@ def outputs(u, seeds=None):
 
 def learned(u, signals, observed, **options):
     family = SignalFamily(**options)
-    measured = family.measure(observed, signals)
+    view = family.view(observed)
+    measured = family.measure(view, signals)
     runs = RunOutcomes(u, np.isfinite(measured.discrepancy))
-    known = TrainingData(observed, u, measured.features, measured.discrepancy, None, runs)
-    return family.learn(known, jax.random.key(0))
+    known = TrainingData(view, u, measured.features, measured.discrepancy, None, runs)
+    return family.learn(known, np.zeros(2, np.uint32))
 
 
 def posterior(surrogate):
