@@ -8,7 +8,7 @@ Rows = Sequence[tuple[str, str]]
 
 
 class Displayed:
-    """A value that shows its rows under the name of its type."""
+    """Shown as a title, the name of its class, and a row for each value."""
 
     def _shown(self) -> Rows:
         raise NotImplementedError

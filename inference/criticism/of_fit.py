@@ -36,7 +36,8 @@ def criticise_fit(
         how: Other arguments of `criticise`, such as `held_out`, `bank` or `seed`.
 
     Raises:
-        ValueError: the fit has no recipe, its noise is not known, or an argument is bad.
+        ValueError: the fit has no recipe, its noise is not known, its signals have another shape
+            than what was observed, or an argument is bad.
     """
     recipe, found = fit.recipe, noise_of(fit) if noise is None else noise
     if found is None:
@@ -45,11 +46,14 @@ def criticise_fit(
             "criticism.KnownNoise(0.05), or what criticism.rest_noise learns from a stretch at rest"
         )
     data = Experiment(recipe.simulate, fit.observed, found, recipe.identity, windows=tuple(windows))
-    history = fit.history
-    whole = np.isfinite(history.signals.reshape(len(history.signals), -1)).all(axis=1)
-    rows = fit.training_mask & whole
-    theta = fit.prior.to_dict(history.theta[rows])
-    earlier = theta, history.signals[rows], history.seeds[rows]
+    history, signals = fit.history, fit.history.signals
+    if signals.shape[1:] != fit.observed.shape:
+        raise ValueError(
+            f"a criticism needs signals of the shape {fit.observed.shape}, as observed, got "
+            f"{signals.shape[1:]}"
+        )
+    rows = fit.training_mask & np.isfinite(signals.reshape(len(signals), -1)).all(axis=1)
+    earlier = fit.prior.to_dict(history.theta[rows]), signals[rows], history.seeds[rows]
     return criticise(data, fit.prior, extensions, earlier=earlier, **how)
 
 
