@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..wording import command
 from .fields import PLANE_NAMES
-from .recording import Recording
+from .recording import Recording, steps
 
 FIRST_TIME = 0.15
 """Time from which the speed at the start is extrapolated [s]."""
@@ -76,8 +76,8 @@ def _usual(recording: Recording) -> tuple[float, float, float]:
     """Speed of the stir [m/s], noise of the position [m] and of the inclination [rad]."""
     time, position = recording.time, recording.gripper.position
     seen = np.isfinite(position).all(axis=1)
-    way = np.linalg.norm(np.diff(position[seen], axis=0), axis=1)
-    fast = float(np.quantile(way / np.diff(time[seen]), 0.9))
+    way, step = steps(time[seen], position[seen])
+    fast = float(np.quantile(way / step, 0.9))
     still = max(map(noise_of, position.T))
     return fast, still, max(map(noise_of, recording.inclination.T))
 
@@ -159,7 +159,7 @@ def _candidates(recording: Recording, fast: float, still: float) -> Iterator[int
     """Samples that may be starts: the gripper is slow, and stirs later."""
     time, position = recording.time, recording.gripper.position
     seen = np.flatnonzero(np.isfinite(position).all(axis=1))
-    way, step = np.linalg.norm(np.diff(position[seen], axis=0), axis=1), np.diff(time[seen])
+    way, step = steps(time[seen], position[seen])
     slow = way < MAX_SPEED_SHARE * fast * step + 2.0 * NOISE_FACTOR * still
     for at in np.flatnonzero(slow):
         first = int(seen[at])
