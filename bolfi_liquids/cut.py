@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .errors import Argument, InputError
-from .files import existing_file, new_netcdf, unused_path, write_netcdf
+from .files import existing_file, new_file, write_netcdf
 from .inputs.described_liquid import number_of
 from .inputs.fields import check_fields
 from .inputs.open import check_recording, open_recording, read_fields
@@ -49,7 +49,8 @@ def trim(
         InputError: The recording cannot be read, it holds no such times, what stays cannot be
             simulated, or `out` cannot be written. Nothing was written.
     """
-    path, out = existing_file(recording), new_netcdf(unused_path(out, Argument("out")))
+    path = existing_file(recording)
+    out = new_file(out, Argument("out"), suffix=".nc", replace=False)
     content = path.read_bytes()
     dataset = read_fields(content, path)
     whole = as_recording(dataset, path, content)
