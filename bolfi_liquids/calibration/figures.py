@@ -182,23 +182,21 @@ def _draw_marginals(
     right.set_xticks([])
 
 
-def _coordinate(surface: "Dataset", name: str) -> NDArray[np.float64]:
-    """The axis as it is drawn: logarithms where it is logarithmic."""
-    values = surface[name].to_numpy()
-    return np.log(values) if name in LOGARITHMIC_PARAMETERS else values
-
-
 def grid_density(
     surface: "Dataset", name: str = "log_posterior"
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-    """Density over the drawn coordinates, up to a constant, in the grid's shape; and these."""
-    log_density = surface[name].to_numpy().copy()
+    """Density over the drawn coordinates, up to a constant, in the grid's shape; and these:
+    logarithms where an axis is logarithmic."""
+    log_density = surface[name].to_numpy()
+    coordinates = []
     for axis, parameter in enumerate(surface[name].dims):
+        values = surface[parameter].to_numpy()
         if parameter in LOGARITHMIC_PARAMETERS:
+            values = np.log(values)
             # Jacobian of the logarithm
             shape = [-1 if axis == at else 1 for at in range(log_density.ndim)]
-            log_density = log_density + np.log(surface[parameter].to_numpy()).reshape(shape)
-    coordinates = [_coordinate(surface, str(name)) for name in surface[name].dims]
+            log_density = log_density + values.reshape(shape)
+        coordinates.append(values)
     return np.exp(log_density - log_density.max()), coordinates
 
 

@@ -39,7 +39,12 @@ def check_start(recording: Recording) -> None:
     if (fault := _fault(recording, 0, *_usual(recording))) is None:
         return
     field, what = fault
-    raise InputError(what, where=f"{recording.path}: {field}", fix=_cure(recording))
+    if (rest := first_rest(recording)) is None:
+        fix = "record from rest: it holds no rest before a stir that it could be cut to"
+    else:
+        cut = command("trim", recording.path, "--start", f"{rest:.3f}", "--out", "FILE.nc")
+        fix = f"record from rest, or cut it: {cut}"
+    raise InputError(what, where=f"{recording.path}: {field}", fix=fix)
 
 
 def above_liquid(recording: Recording, first: int = 0) -> float:
@@ -167,10 +172,3 @@ def _candidates(recording: Recording, fast: float, still: float) -> Iterator[int
         far = np.linalg.norm(later - later[0], axis=1)
         if time[-1] - time[first] >= MIN_STIR and np.nanmax(far) >= MIN_TRAVEL:
             yield first
-
-
-def _cure(recording: Recording) -> str:
-    if (rest := first_rest(recording)) is None:
-        return "record from rest: it holds no rest before a stir that it could be cut to"
-    cut = command("trim", recording.path, "--start", f"{rest:.3f}", "--out", "FILE.nc")
-    return f"record from rest, or cut it: {cut}"

@@ -238,16 +238,11 @@ class Run:
         """
         tree, why = self._look(step)
         if tree is None:
-            for earlier in self._missing_before(step):
-                self.required(earlier)
+            for earlier in list(RESULTS)[: list(RESULTS).index(step)]:
+                if earlier == "calibrate" or self.why_not(earlier):  # a criticism is not needed
+                    self.required(earlier)
             raise InputError(why, where=str(self.path), fix=f"run: {self.again(step)}")
         return tree
-
-    def _missing_before(self, step: str) -> list[str]:
-        """Earlier steps that must be made again first: a run may do without a criticism."""
-        earlier = list(RESULTS)[: list(RESULTS).index(step)]
-        needed = [one for one in earlier if one == "calibrate" or self.why_not(one)]
-        return [one for one in needed if self.result(one) is None]
 
     def keep(
         self,
