@@ -167,9 +167,10 @@ class Run:
         """
         differing = _differences(self.record, wanted)
         held, asked = differing.get(growing, (None, None))
-        if grows := (asked or 0) > (held or 0):
+        if grows := isinstance(held, int) and isinstance(asked, int) and asked > held:
             del differing[growing]
-        for field, (held, asked) in differing.items():
+        if differing:
+            field, (held, asked) = next(iter(differing.items()))
             if field.startswith("inputs."):
                 what = "is of other recordings"
                 fix = f"give those that {RUN_TOML} names under files, unchanged, or another `out`"
@@ -289,7 +290,9 @@ class Run:
     def again(self, step: str) -> str:
         """The command that makes a step's result, with the options of one that is readable."""
         if step == "calibrate":
-            clean = ["--baseline", "CLEAN..."] if "baseline" in self.record["inputs"] else []
+            clean = (
+                ["--baseline", "CLEAN..."] if "baseline" in self.record.get("inputs", {}) else []
+            )
             return self._calibrate_again(*clean, "--out", self.path, "--resume")
         try:
             made = json.loads(read_result(self.path / RESULTS[step]).attrs["made_from"])
@@ -306,7 +309,7 @@ class Run:
     def _calibrate_again(self, *words: object) -> str:
         """The command that calibrates on the kept recordings, with the settings of the run."""
         recordings = kept_paths(self.path, self.record) or ("RECORDING...",)
-        options = _options(self.record["settings"], asdict(CalibrationSettings()))
+        options = _options(self.record.get("settings", {}), asdict(CalibrationSettings()))
         return command("calibrate", *recordings, *words, *options)
 
     def _look(self, step: str) -> "tuple[DataTree | None, str]":
