@@ -8,14 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from .errors import Argument, InputError
-from .files import existing_file, new_netcdf, unused_path, write_netcdf
+from .files import existing_file, new_file, write_netcdf
 from .inputs.described_liquid import number_of
 from .inputs.fields import check_fields
 from .inputs.open import check_recording, open_recording, read_fields
 from .inputs.recording import Recording, as_recording
 from .inputs.start import first_rest
-
-CHOOSE_TIMES = "give --start and --stop within it"
 
 
 class Cut(NamedTuple):
@@ -49,7 +47,8 @@ def trim(
         InputError: The recording cannot be read, it holds no such times, what stays cannot be
             simulated, or `out` cannot be written. Nothing was written.
     """
-    path, out = existing_file(recording), new_netcdf(unused_path(out, Argument("out")))
+    path = existing_file(recording)
+    out = new_file(out, Argument("out"), suffix=".nc", replace=False)
     content = path.read_bytes()
     dataset = read_fields(content, path)
     whole = as_recording(dataset, path, content)
@@ -60,7 +59,13 @@ def trim(
         part[name].encoding.clear()  # chunks of the whole may be longer than the part
     check_fields(part, path)
     check_recording(as_recording(part, path, content))
-    history = [str(dataset.attrs.get("history") or ""), _told(path, whole, cut)]
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    made = (
+        f"{now}: {cut.start:.10g} to {cut.stop:.10g} s of {path.name} ({whole.time[0]:.10g} to "
+        f"{whole.time[-1]:.10g} s, SHA-256 {whole.hash}), cut by bolfi-liquids "
+        f"{version('bolfi-liquids')}"
+    )
+    history = [str(dataset.attrs.get("history") or ""), made]
     write_netcdf(part.assign_attrs(history="\n".join(filter(None, history))), out)
     return open_recording(out)
 
@@ -78,26 +83,21 @@ def proposed_cut(
     if not len(time) or not np.isfinite(time).all() or (np.diff(time) <= 0.0).any():
         fix = "sort the samples, drop repeated ones, and give each a time"
         raise InputError("times do not increase", where=f"{where}: time", fix=fix)
-    if stop is None:
-        stop = _last_seen(recording)
-    else:
-        stop = number_of(stop, Argument("stop"))
-    if start is None:
-        start = first_rest(recording)
-        if start is None:
-            raise InputError(
-                "there is no time at which gripper and stick rest in the liquid before a stir",
-                where=where,
-                fix="record from rest, or give `start`",
-            )
-    else:
+    stop = _last_seen(recording) if stop is None else number_of(stop, Argument("stop"))
+    if start is not None:
         start = number_of(start, Argument("start"))
+    elif (start := first_rest(recording)) is None:
+        raise InputError(
+            "there is no time at which gripper and stick rest in the liquid before a stir",
+            where=where,
+            fix="record from rest, or give `start`",
+        )
     if not time[0] <= stop or not start <= time[-1] or not start < stop:
         raise InputError(
             f"nothing lies from {start:g} to {stop:g} s; it lasts from {time[0]:.10g} to "
             f"{time[-1]:.10g} s",
             where=where,
-            fix=CHOOSE_TIMES,
+            fix="give `start` and `stop` within it",
         )
     return Cut(float(start), float(stop))
 
@@ -111,13 +111,3 @@ def _last_seen(recording: Recording) -> float:
         )
     last = recording.time[np.flatnonzero(seen)[-1]]
     return float(np.ceil(1000.0 * last) / 1000.0)  # as it is printed
-
-
-def _told(path: Path, whole: Recording, cut: Cut) -> str:
-    """A line of the file's history."""
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    return (
-        f"{now}: {cut.start:.10g} to {cut.stop:.10g} s of {path.name} ({whole.time[0]:.10g} to "
-        f"{whole.time[-1]:.10g} s, SHA-256 {whole.hash}), cut by bolfi-liquids "
-        f"{version('bolfi-liquids')}"
-    )

@@ -56,36 +56,25 @@ def given_path(path: str | Path, where: str) -> Path:
     return given
 
 
-def unused_path(path: str | Path, where: str) -> Path:
-    """A path that a person gave to be written to, and that nothing has.
+def new_file(path: str | Path, where: str, *, suffix: str = "", replace: bool = True) -> Path:
+    """A path that a person gave, to be written as a file.
+
+    Args:
+        path: As given.
+        where: The option or argument.
+        suffix: In which its name must end.
+        replace: Whether there may be a file already.
 
     Raises:
-        InputError: See `given_path`, or there is something already.
+        InputError: See `given_path`; or the name ends otherwise, is that of a directory or of a
+            file, or no file can be made in its directory.
     """
-    given = given_path(path, where)
-    if given.exists():
-        raise InputError("exists already", where=str(given), fix="choose another name")
-    return given
-
-
-def new_netcdf(path: str | Path) -> Path:
-    """`path`, which a person gave to be written.
-
-    Raises:
-        InputError: Its name does not end in .nc, or no such file can be made there.
-    """
-    path = Path(path)
-    if path.suffix != ".nc":
-        raise InputError(f"ends in {path.suffix!r}", where=str(path), fix="give a name in .nc")
-    return new_file(path)
-
-
-def new_file(path: Path) -> Path:
-    """`path`, which a person gave to be written; one that is there is replaced.
-
-    Raises:
-        InputError: It is a directory, or no file can be made in its directory.
-    """
+    path = given_path(path, where)
+    if not path.name.endswith(suffix):
+        what = f"ends in {path.suffix!r}"
+        raise InputError(what, where=str(path), fix=f"give a name in {suffix}")
+    if path.exists() and not replace:
+        raise InputError("exists already", where=str(path), fix="choose another name")
     if not path.parent.is_dir():
         raise InputError("no such directory", where=str(path.parent), fix="make it first")
     if path.is_dir():

@@ -26,11 +26,6 @@ def ensure_home() -> None:
                     os.makedirs(os.environ[name], exist_ok=True)
 
 
-def temporary_home() -> str:
-    """The directory that serves a user without a home."""
-    return os.path.join(tempfile.gettempdir(), f"bolfi-liquids-{os.getuid()}")
-
-
 def _of_passwd() -> str:
     """The home that the computer knows for this user, if it can be written; else ""."""
     with contextlib.suppress(KeyError):
@@ -40,7 +35,8 @@ def _of_passwd() -> str:
 
 
 def _made_temporary() -> str:
-    home = temporary_home()
+    """A directory that serves a user without a home."""
+    home = os.path.join(tempfile.gettempdir(), f"bolfi-liquids-{os.getuid()}")
     with contextlib.suppress(FileExistsError):
         os.mkdir(home, mode=0o700)
     own = not os.path.islink(home) and os.stat(home).st_uid == os.getuid()

@@ -16,7 +16,8 @@ from pydantic import (
 from .numerics import MODEL_VERSION
 from .pours.resolution import LEAST_VISCOSITY, Filled, settings
 
-MIN_LENGTH, MAX_RADIUS, MAX_HEIGHT = 1e-3, 0.25, 2.0  # [m] of cups that are poured by hand or arm
+MIN_SIZE, MAX_RADIUS, MAX_HEIGHT = 5e-3, 0.25, 0.5  # [m] of cups that are poured by hand or arm
+MIN_FILL, MAX_LIP_HEIGHT = 1e-3, 1.0  # [m]
 MAX_DISTANCE = 0.5  # [m] from the lip to the receiver's axis
 SLOWEST, FASTEST = 0.01, 30.0  # rad/s: a pour of three minutes; a cup that is flung
 CONTACT_ANGLE_DEG = 60.0
@@ -44,8 +45,10 @@ def _pourable(rate: float) -> float:
 
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Radius = Annotated[Number, Field(ge=MIN_LENGTH), _up_to(MAX_RADIUS)]
-Height = Annotated[Number, Field(ge=MIN_LENGTH), _up_to(MAX_HEIGHT)]
+Radius = Annotated[Number, Field(ge=MIN_SIZE), _up_to(MAX_RADIUS)]
+Height = Annotated[Number, Field(ge=MIN_SIZE), _up_to(MAX_HEIGHT)]
+Depth = Annotated[Number, Field(ge=MIN_FILL), _up_to(MAX_HEIGHT)]
+LipHeight = Annotated[Number, Field(ge=MIN_SIZE), _up_to(MAX_LIP_HEIGHT)]
 Distance = Annotated[Number, _up_to(MAX_DISTANCE)]
 Degrees = Annotated[Number, Field(gt=0, le=180)]
 ContactDegrees = Annotated[Number, Field(ge=0, le=180)]
@@ -65,7 +68,7 @@ class Source(_Section, frozen=True):
 
     radius: Radius
     height: Height
-    fill: Height
+    fill: Depth
     contact_angle_deg: ContactDegrees = CONTACT_ANGLE_DEG
 
     @property
@@ -90,7 +93,7 @@ class Receiver(_Section, frozen=True):
 class PourPlan(_Section, frozen=True):
     """How the source turns, and the range of the decision, in the units that people type."""
 
-    lip_height: Height
+    lip_height: LipHeight
     final_angle_deg: Degrees
     hold: Seconds
     angular_velocity_deg_s: tuple[DegreesPerSecond, DegreesPerSecond]
@@ -123,6 +126,17 @@ class Cups(_Section, frozen=True):
             raise ValueError(
                 f"the lip ({self.pour.lip_height} m) is not above the receiver's rim "
                 f"({self.receiver.height} m)"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _liquid_reaches_the_lip(self) -> "Cups":
+        source, angle = self.source, self.pour.final_angle_deg
+        least = float(np.degrees(np.arctan2(source.height - source.fill, source.radius)))
+        if angle <= least:
+            raise ValueError(
+                f"pour.final_angle_deg = {angle:g}: nothing flows over the lip up to "
+                f"{least:.0f} deg; turn the source further"
             )
         return self
 

@@ -66,14 +66,24 @@ class Numerics:
         return min(slow, self.courant * cell / max(speed, 1e-9))
 
 
+def cells_in_radius(stick_radius: float, cell: float) -> float:
+    """Radius of a stick in cells; whole particles make cells that miss it by a little."""
+    return round(stick_radius / cell, 2)
+
+
+def is_tested(ratio: float) -> bool:
+    """Whether references were compared for a stick of this radius in cells."""
+    return TESTED_RATIO[0] <= ratio <= TESTED_RATIO[1]
+
+
 def check_resolution(stick_radius: float, cell: float) -> None:
     """Warn where the stick is not as wide as tested.
 
     Warns:
         UntestedResolution: names the ratio.
     """
-    ratio = round(stick_radius / cell, 2)  # whole particles make cells that miss it by a little
-    if not TESTED_RATIO[0] <= ratio <= TESTED_RATIO[1]:
+    ratio = cells_in_radius(stick_radius, cell)
+    if not is_tested(ratio):
         warnings.warn(
             f"the stick's radius is {ratio:.2f} cells; {TESTED_RATIO[0]} to {TESTED_RATIO[1]} were "
             "compared with references: leave `particles` out, and cells follow the stick",

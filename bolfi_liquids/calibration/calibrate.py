@@ -23,7 +23,7 @@ from ..inputs.settings import (
     Surrogate,
 )
 from ..inputs.start import check_start
-from ..progress import Advance, after_first, progress_bar
+from ..progress import after_first, progress_bar
 from ..run.compute import open_compute
 from ..run.given_pours import keep_pours
 from ..run.provenance import versions
@@ -40,7 +40,6 @@ from .engine_fit import (
 )
 from .model_error import (
     CLEAN_RUNS,
-    Clean,
     check_baseline,
     clean_residuals,
     model_error,
@@ -221,7 +220,14 @@ def _calibrate(run: Run, inputs: CalibrationInputs, compute: "Compute", progress
         )
         error = None
         if allows:
-            clean = _clean_residuals(inputs, compute, advance)
+            clean = clean_residuals(  # criticise finds the same simulations
+                inputs.clean,
+                settings.particles,
+                inputs.prior,
+                effects_of("stir"),
+                compute=replace(compute, batch=CriticismSettings.batch),
+                report=lambda _, finished: advance(finished),
+            )
             error = model_error(stirring, fit.best["viscosity"], clean)
         fit = confirmed(fit, error, stirring, compute, settings, advance)
         warn_of_failures(fit.history.why.tolist(), compute.timeout)
@@ -232,20 +238,6 @@ def _calibrate(run: Run, inputs: CalibrationInputs, compute: "Compute", progress
     tree = results_tree(sampled, fit, stirring, check)
     summary = CalibrationSummary.from_fit(tree, fit, stirring, check, error, settings.budget)
     run.keep("calibrate", tree, run.made_from, summary.to_json())
-
-
-def _clean_residuals(
-    inputs: CalibrationInputs, compute: "Compute", advance: Advance
-) -> list[Clean]:
-    """What the simulator leaves of clean recordings; criticise finds the same simulations."""
-    return clean_residuals(
-        inputs.clean,
-        inputs.settings.particles,
-        inputs.prior,
-        effects_of("stir"),
-        compute=replace(compute, batch=CriticismSettings.batch),
-        report=lambda _, finished: advance(finished),
-    )
 
 
 def _usual_prior(path: Path, resume: bool) -> "Prior":

@@ -152,6 +152,8 @@ def check_of(
     Raises:
         RuntimeError: Every simulation at a posterior draw failed, or every one at theta*.
     """
+    from ..inference.result import Closest
+
     drawn = fit.confirming
     good = drawn[fit.history.succeeded[drawn]]
     if not good.size:
@@ -159,27 +161,21 @@ def check_of(
             f"all {len(drawn)} simulations at draws of the posterior failed, the first:"
             f" {fit.history.errors[drawn[0]]}; repeat the call with a larger budget"
         )
+    distance, history = stirring.discrepancy(), fit.history
+    discrepancies = [distance(stirring.observed, history.signal(run)) for run in good]
+    nearest = int(np.argmin(discrepancies))
+    theta = fit.prior.to_dict(history.theta[good[nearest]])
+    closest = Closest(
+        {name: float(value) for name, value in theta.items()},
+        history.signal(good[nearest]),
+        discrepancies[nearest],
+    )
     at_best = {name: np.full(THETA_STAR_REPLICATES, value) for name, value in fit.best.items()}
     seeds = simulation_seeds(seed, Phase.REPLICATES, THETA_STAR_REPLICATES)
     replicates = simulate_kept(stirring, at_best, seeds, compute, advance=advance)
     return PosteriorCheck(
-        _closest(stirring, fit, good),
+        closest,
         fit.history.signals[good],
         replicates.signals,
         replicates.seconds,
-    )
-
-
-def _closest(stirring: StirSimulator, fit: "Fit", runs: NDArray[np.int64]) -> "Closest":
-    """The one of these runs that comes nearest to what was recorded."""
-    from ..inference.result import Closest
-
-    distance, history = stirring.discrepancy(), fit.history
-    discrepancies = [distance(stirring.observed, history.signal(run)) for run in runs]
-    at = int(np.argmin(discrepancies))
-    theta = fit.prior.to_dict(history.theta[runs[at]])
-    return Closest(
-        {name: float(value) for name, value in theta.items()},
-        history.signal(runs[at]),
-        discrepancies[at],
     )

@@ -46,24 +46,27 @@ def draw_fit(tree: "DataTree", axes: "Canvas" = None) -> Panels:
         tree: posterior.nc.
         axes: Where to draw, see `drawing.panels`.
     """
-    recorded = tree["recorded"].to_dataset()
-    members = np.unique(recorded["recording"])
+    members = _by_recording(tree, "recorded", "closest", "posterior_predictive")
     size = 8.6, 2.6 * len(members) + 0.4
     drawn = panels(axes, (len(members), 2), size, sharex="row", sharey=True)
-    for row, member in zip(drawn.grid, members, strict=True):
-        frames = np.flatnonzero(recorded["recording"].to_numpy() == member)
-        for axis, plane in zip(row, recorded["plane"].to_numpy(), strict=True):
-            part = {
-                name: tree[name].to_dataset().sel(plane=plane).isel(frame=frames)
-                for name in ("recorded", "closest", "posterior_predictive")
-            }
-            _draw_inclination(axis, part)
+    for row, parts in zip(drawn.grid, members, strict=True):
+        for axis, plane in zip(row, parts["recorded"]["plane"].to_numpy(), strict=True):
+            _draw_inclination(axis, {name: one.sel(plane=plane) for name, one in parts.items()})
             axis.set_title(f"{plane} plane", loc="left")
         row[0].set_ylabel("inclination [deg]")
     for axis in drawn.grid[-1]:
         axis.set_xlabel("time [s]")
     drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
     return drawn
+
+
+def _by_recording(tree: "DataTree", *groups: str) -> list[dict[str, "Dataset"]]:
+    """Groups of posterior.nc by name, for each recording."""
+    member = tree["recorded"]["recording"].to_numpy()
+    return [
+        {name: tree[name].to_dataset().isel(frame=np.flatnonzero(member == one)) for name in groups}
+        for one in np.unique(member)
+    ]
 
 
 def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> None:
@@ -101,12 +104,10 @@ def draw_strokes(tree: "DataTree", axes: "Canvas" = None) -> Panels:
         tree: posterior.nc.
         axes: Where to draw, see `drawing.panels`.
     """
-    recorded, predicted = (tree[name].to_dataset() for name in ("recorded", "posterior_predictive"))
-    members = np.unique(recorded["recording"])
+    members = _by_recording(tree, "recorded", "posterior_predictive")
     drawn = panels(axes, (len(members), 1), (8.6, 2.2 * len(members) + 0.4))
-    for axis, member in zip(drawn.grid[:, 0], members, strict=True):
-        frames = np.flatnonzero(recorded["recording"].to_numpy() == member)
-        _draw_strokes(axis, recorded.isel(frame=frames), predicted.isel(frame=frames))
+    for axis, parts in zip(drawn.grid[:, 0], members, strict=True):
+        _draw_strokes(axis, parts["recorded"], parts["posterior_predictive"])
         axis.set_ylabel("RMS [deg]")
     drawn.grid[-1, 0].set_xlabel("stroke")
     drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
@@ -181,23 +182,21 @@ def _draw_marginals(
     right.set_xticks([])
 
 
-def _coordinate(surface: "Dataset", name: str) -> NDArray[np.float64]:
-    """The axis as it is drawn: logarithms where it is logarithmic."""
-    values = surface[name].to_numpy()
-    return np.log(values) if name in LOGARITHMIC_PARAMETERS else values
-
-
 def grid_density(
     surface: "Dataset", name: str = "log_posterior"
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-    """Density over the drawn coordinates, up to a constant, in the grid's shape; and these."""
-    log_density = surface[name].to_numpy().copy()
+    """Density over the drawn coordinates, up to a constant, in the grid's shape; and these:
+    logarithms where an axis is logarithmic."""
+    log_density = surface[name].to_numpy()
+    coordinates = []
     for axis, parameter in enumerate(surface[name].dims):
+        values = surface[parameter].to_numpy()
         if parameter in LOGARITHMIC_PARAMETERS:
+            values = np.log(values)
             # Jacobian of the logarithm
             shape = [-1 if axis == at else 1 for at in range(log_density.ndim)]
-            log_density = log_density + np.log(surface[parameter].to_numpy()).reshape(shape)
-    coordinates = [_coordinate(surface, str(name)) for name in surface[name].dims]
+            log_density = log_density + values.reshape(shape)
+        coordinates.append(values)
     return np.exp(log_density - log_density.max()), coordinates
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..inputs.fields import PLANE_NAMES
 from ..inputs.strokes import stroke_numbers
+from ..models.numerics import cells_in_radius
 from ..simulators import StirSimulator
 from .engine_fit import PosteriorCheck
 
@@ -61,7 +62,7 @@ def results_tree(
     tree.attrs["seconds_simulator"] += check.seconds
     tree.attrs["least_viscosity"] = stirring.least_viscosity
     tree.attrs["stick_radius_cells"] = [
-        round(setup.stick.radius / setup.cell, 2) for setup in stirring.setups
+        cells_in_radius(setup.stick.radius, setup.cell) for setup in stirring.setups
     ]
     tree.attrs["liquid_density"] = stirring.recordings[0].number("liquid_density")
     return tree

@@ -4,7 +4,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..files import new_file, unused_path, write_text
+from ..files import new_file, write_text
 from .open import open_recording
 from .recording import Recording
 
@@ -36,5 +36,5 @@ def write_template(name: str, path: str | Path) -> Path:
     Raises:
         InputError: There is a file already, or none can be made there.
     """
-    target = new_file(unused_path(path, "FILE"))
+    target = new_file(path, "FILE", replace=False)
     return write_text(target, (files(TEMPLATES[name]) / name).read_text(encoding="utf-8"))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .fields import AXES, PLANES, STICK_WEIGHT
-from .recording import JUMPS, Recording, torn_values
+from .recording import JUMPS, Recording, steps, torn_values
 from .start import above_liquid, noise_of
 
 LIMITS = {
@@ -23,7 +23,7 @@ LIMITS = {
     "stick_length": (0.02, 1.0, "m"),
     "liquid_density": (50.0, 20_000.0, "kg/m3"),
     "stick_density": (50.0, 20_000.0, "kg/m3"),
-    "stick_mass": (0.0, 2.0, "kg"),
+    "stick_mass": (1e-6, 2.0, "kg"),
 }
 """Smallest and largest value of each attribute, and its unit."""
 
@@ -81,7 +81,7 @@ class Rule(NamedTuple):
                 continue
             attribute = "attribute " if field in LIMITS else ""
             raise InputError(
-                f"{self.quantity} = {value:.6g} {self.unit}".strip()
+                f"{self.quantity} = {value:.6g} {self.unit}".strip(" =")
                 + f"{note}, {_span(self.least, self.most)} {self.unit}".rstrip()
                 + " allowed",
                 where=f"{recording.path}: {attribute}{field}",
@@ -91,20 +91,21 @@ class Rule(NamedTuple):
 
 def check_values(recording: Recording) -> None:
     """Raise `InputError` at the first value that no simulator could use."""
-    for name, (least, most, unit) in LIMITS.items():
-        if name in STICK_WEIGHT and name not in recording.attrs:
-            continue
-        value = recording.attrs[name]
-        size = value if isinstance(value, int | float) and not isinstance(value, bool) else np.nan
-        if not 0.0 < size or not least <= size <= most:
-            given = " ".join(repr(value).split()) if np.isnan(size) else f"{size:g} {unit}"
-            raise InputError(
-                f"{given:.80}, {_span(least, most)} {unit} allowed",
-                where=f"{recording.path}: attribute {name}",
-                fix=f"give a positive number in {unit}, or measure it again",
-            )
-    for rule in RULES:
+    sizes = [
+        Rule((name,), "", _size, least, most, unit, f"give a number in {unit}, or measure it again")
+        for name, (least, most, unit) in LIMITS.items()
+        if name in recording.attrs
+    ]
+    for rule in (*sizes, *RULES):
         rule.check(recording)
+
+
+def _size(recording: Recording, field: str) -> Measured:
+    """An attribute; NaN where it is no number."""
+    value = recording.attrs[field]
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return value
+    return np.nan, f" ({' '.join(repr(value).split()):.80})"
 
 
 def _span(least: float, most: float) -> str:
@@ -194,8 +195,8 @@ def _gap(recording: Recording, field: str) -> Measured:
 
 def _usual_speed(recording: Recording, field: str) -> Measured:
     seen = np.isfinite(recording.gripper.position).all(axis=1)
-    way, time = recording.gripper.position[seen], recording.time[seen]
-    return float(np.median(np.linalg.norm(np.diff(way, axis=0), axis=1) / np.diff(time)))
+    way, step = steps(recording.time[seen], recording.gripper.position[seen])
+    return float(np.median(way / step))
 
 
 def _seen(recording: Recording, field: str) -> Measured:
@@ -216,8 +217,7 @@ def _frozen(recording: Recording, field: str) -> tuple[float, float, str]:
     """Time of one and the same number while the gripper moves: longest [s], and share of all."""
     values, time, position = recording.values(field), *recording.gripper
     seen = np.isfinite(values) & np.isfinite(position).all(axis=1)
-    step = np.diff(time[seen])
-    way = np.linalg.norm(np.diff(position[seen], axis=0), axis=1)
+    way, step = steps(time[seen], position[seen])
     moving = way > MIN_SPEED_SHARE * float(np.quantile(way / step, 0.9)) * step
     same = np.diff(values[seen]) == 0.0
     if not (moving & same).any():

@@ -124,12 +124,13 @@ def check_effects(effects: Mapping[str, Any] | None, scene: str) -> dict[str, fl
             f"{effects!r:.80}", where=Argument("effects"), fix="give coefficients by name"
         )
     for name, value in effects.items():
-        is_real = isinstance(value, Real) and not isinstance(value, bool)
-        where = f"--effect {name}={f'{value:g}' if is_real else value}"
+        is_number = isinstance(value, Real) and not isinstance(value, bool)
+        number = float(value) if is_number else math.nan
+        where = f"--effect {name}={f'{number:g}' if is_number else value}"
         if name not in EFFECTS:
             raise InputError("unknown", where=where, fix=f"there are {', '.join(sorted(EFFECTS))}")
         effect = EFFECTS[name]
-        if not is_real or not effect.lowest <= value <= effect.highest:
+        if not effect.lowest <= number <= effect.highest:
             raise InputError(
                 f"{value!r:.80} is no coefficient of it",
                 where=where,

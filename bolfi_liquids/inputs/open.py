@@ -63,18 +63,17 @@ def open_recordings(
     Raises:
         InputError: One of them cannot be used.
     """
-    one_alone = isinstance(sources, Source) or not isinstance(sources, Iterable)
+    if isinstance(sources, Source) or not isinstance(sources, Iterable):
+        sources = [sources]
     opened = []
-    for one in [sources] if one_alone else sources:
-        if isinstance(one, str | Path):
-            one = open_recording(one)
-        elif not isinstance(one, Recording):
+    for one in sources:
+        if not isinstance(one, Source):
             raise InputError(
                 f"{one!r:.80} is no recording",
                 where=option,
                 fix="give paths of NetCDF files, or what open_recording returns",
             )
-        opened.append(one)
+        opened.append(one if isinstance(one, Recording) else open_recording(one))
     return opened
 
 

@@ -97,7 +97,7 @@ def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:
         InputError: The file is missing or cannot be used; the message names file, line, column
             and value.
     """
-    table = read_table(path)
+    table = read_table(path, RANGES)
     if missing := [name for name in RANGES if not table.has(name)]:
         raise InputError(
             f"has no column {', '.join(missing)}",

@@ -190,6 +190,11 @@ def as_recording(dataset: "Dataset", path: Path, content: bytes) -> Recording:
     )
 
 
+def steps(time: NDArray, position: NDArray) -> tuple[NDArray, NDArray]:
+    """Way [m] and time [s] from each sample to the next, shape (T - 1,), of positions (T, 3)."""
+    return np.linalg.norm(np.diff(position, axis=0), axis=1), np.diff(time)
+
+
 def torn_values(values: NDArray, jump: float) -> NDArray[np.bool_]:
     """Which values lie far from both of their neighbours, while these agree.
 

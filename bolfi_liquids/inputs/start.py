@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..wording import command
 from .fields import PLANE_NAMES
-from .recording import Recording
+from .recording import Recording, steps
 
 FIRST_TIME = 0.15
 """Time from which the speed at the start is extrapolated [s]."""
@@ -39,7 +39,12 @@ def check_start(recording: Recording) -> None:
     if (fault := _fault(recording, 0, *_usual(recording))) is None:
         return
     field, what = fault
-    raise InputError(what, where=f"{recording.path}: {field}", fix=_cure(recording))
+    if (rest := first_rest(recording)) is None:
+        fix = "record from rest: it holds no rest before a stir that it could be cut to"
+    else:
+        cut = command("trim", recording.path, "--start", f"{rest:.3f}", "--out", "FILE.nc")
+        fix = f"record from rest, or cut it: {cut}"
+    raise InputError(what, where=f"{recording.path}: {field}", fix=fix)
 
 
 def above_liquid(recording: Recording, first: int = 0) -> float:
@@ -76,8 +81,8 @@ def _usual(recording: Recording) -> tuple[float, float, float]:
     """Speed of the stir [m/s], noise of the position [m] and of the inclination [rad]."""
     time, position = recording.time, recording.gripper.position
     seen = np.isfinite(position).all(axis=1)
-    way = np.linalg.norm(np.diff(position[seen], axis=0), axis=1)
-    fast = float(np.quantile(way / np.diff(time[seen]), 0.9))
+    way, step = steps(time[seen], position[seen])
+    fast = float(np.quantile(way / step, 0.9))
     still = max(map(noise_of, position.T))
     return fast, still, max(map(noise_of, recording.inclination.T))
 
@@ -159,7 +164,7 @@ def _candidates(recording: Recording, fast: float, still: float) -> Iterator[int
     """Samples that may be starts: the gripper is slow, and stirs later."""
     time, position = recording.time, recording.gripper.position
     seen = np.flatnonzero(np.isfinite(position).all(axis=1))
-    way, step = np.linalg.norm(np.diff(position[seen], axis=0), axis=1), np.diff(time[seen])
+    way, step = steps(time[seen], position[seen])
     slow = way < MAX_SPEED_SHARE * fast * step + 2.0 * NOISE_FACTOR * still
     for at in np.flatnonzero(slow):
         first = int(seen[at])
@@ -167,10 +172,3 @@ def _candidates(recording: Recording, fast: float, still: float) -> Iterator[int
         far = np.linalg.norm(later - later[0], axis=1)
         if time[-1] - time[first] >= MIN_STIR and np.nanmax(far) >= MIN_TRAVEL:
             yield first
-
-
-def _cure(recording: Recording) -> str:
-    if (rest := first_rest(recording)) is None:
-        return "record from rest: it holds no rest before a stir that it could be cut to"
-    cut = command("trim", recording.path, "--start", f"{rest:.3f}", "--out", "FILE.nc")
-    return f"record from rest, or cut it: {cut}"

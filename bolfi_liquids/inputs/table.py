@@ -123,12 +123,18 @@ class Table:
 
 
 def read_table(
-    path: str | Path, *, delimiter: str | None = None, decimal: str | None = None, skip: int = 0
+    path: str | Path,
+    names: Iterable[str] = (),
+    *,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+    skip: int = 0,
 ) -> Table:
     """Read a table.
 
     Args:
         path: The file, UTF-8 text or .xlsx.
+        names: Of columns that it should have, for a refusal of one without a header.
         delimiter: Between two cells; None follows the rule of this module.
         decimal: "." or "," in a number; None likewise.
         skip: Lines before the header.
@@ -148,7 +154,12 @@ def read_table(
     first, header = rows[0] if rows else (1, [])
     while header and not header[-1]:
         header = header[:-1]
-    _check_header(path, header, first)
+    if header and all(map(is_number, header)):
+        raise InputError(
+            "holds numbers, not the names of columns",
+            where=f"{path}: line {first}",
+            fix=f"write a line of names above the numbers: {','.join(names) or 'a,b,...'}",
+        )
     kept = [(line, row) for line, row in rows[1:] if any(row)]
     for line, row in kept:
         _check_row(path, line, row, len(header))
@@ -240,17 +251,6 @@ def _sheet(path: Path) -> list[Row]:
         raise InputError("no workbook that can be read", where=str(path), fix=SAVE_AS_CSV) from err
     rows = sheet.to_numpy().tolist()
     return [(line, [cell.strip() for cell in row]) for line, row in enumerate(rows, start=1)]
-
-
-def _check_header(path: Path, header: list[str], line: int) -> None:
-    """Refuse a table that begins with its numbers."""
-    if header and all(map(is_number, header)):
-        raise InputError(
-            "holds numbers, not the names of columns",
-            where=f"{path}: line {line}",
-            fix="write a line of names above the numbers, such as "
-            "time,x,y,z,inclination_xz,inclination_yz",
-        )
 
 
 def _check_row(path: Path, line: int, row: list[str], columns: int) -> None:

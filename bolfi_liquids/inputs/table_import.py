@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from ..errors import Argument, InputError
-from ..files import given_path, new_netcdf, write_netcdf
+from ..files import new_file, write_netcdf
 from .checks import MAX_GRIPPER_GAP, MIN_SEEN, check_values, clock_difference
 from .fields import AXES, PLANES, STICK_WEIGHT
 from .frame import frame_faults
@@ -91,8 +91,7 @@ class Quantity[Unit: str](Given):
     unit: Unit
 
 
-def _several(given: Any) -> Any:
-    return tuple(given) if isinstance(given, list | tuple) else (given,)
+OneOrSeveral = BeforeValidator(lambda one: tuple(one) if isinstance(one, list | tuple) else (one,))
 
 
 class Columns(Given):
@@ -101,9 +100,11 @@ class Columns(Given):
     Several columns of `time`, such as seconds and nanoseconds, are added.
     """
 
-    time: Annotated[tuple[Column[Seconds], ...], BeforeValidator(_several), Field(min_length=1)] = (
-        Column[Seconds](column="time", unit="s"),
-    )
+    time: Annotated[
+        tuple[Column[Seconds], ...],
+        OneOrSeveral,
+        Field(min_length=1),
+    ] = (Column[Seconds](column="time", unit="s"),)
     x: Column[Metres] = Column[Metres](column="x", unit="m")
     y: Column[Metres] = Column[Metres](column="y", unit="m")
     z: Column[Metres] = Column[Metres](column="z", unit="m")
@@ -216,10 +217,14 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
         InputError: The table or the map cannot be used; the message names line, column and value.
             Or `out` is something else that is there already. Nothing was written.
     """
-    out = given_path(out, Argument("out"))
+    out = new_file(out, Argument("out"), suffix=".nc")
     meaning = columns if isinstance(columns, TableMap) else open_table_map(columns)
     read = read_table(
-        table, delimiter=meaning.delimiter, decimal=meaning.decimal, skip=meaning.skip
+        table,
+        [column.column for _, column in meaning.columns.by_field()],
+        delimiter=meaning.delimiter,
+        decimal=meaning.decimal,
+        skip=meaning.skip,
     )
     dataset, told = _dataset(read, meaning)
     try:
@@ -240,7 +245,6 @@ def _check_target(out: Path) -> None:
     """Refuse to write over anything but an earlier import."""
     from xarray import open_dataset
 
-    new_netcdf(out)
     if not out.exists():
         return
     try:

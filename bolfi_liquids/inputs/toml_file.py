@@ -3,7 +3,6 @@
 import tomllib
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
@@ -38,13 +37,9 @@ def read_toml[Model: BaseModel](path: str | Path, model: type[Model], fix: str) 
 
 def _likely(err: ValidationError, model: type[BaseModel]) -> str:
     """A question for the field that an unknown one is probably meant to be; "" without one."""
-    unknown = [one["loc"] for one in err.errors() if one["type"] == "extra_forbidden"]
-    if not unknown:
-        return ""
-    *tables, name = unknown[0]
-    owner: Any = model
-    for table in tables:
-        fields = getattr(owner, "model_fields", {})
-        owner = fields[table].annotation if table in fields else None
-    close = get_close_matches(str(name), getattr(owner, "model_fields", {}), n=1, cutoff=0.5)
+    unknown = [str(one["loc"][-1]) for one in err.errors() if one["type"] == "extra_forbidden"]
+    schema = model.model_json_schema()
+    tables = (schema, *schema.get("$defs", {}).values())
+    known = [name for table in tables for name in table.get("properties", ())]
+    close = get_close_matches(unknown[0], known, n=1, cutoff=0.5) if unknown else []
     return f"did you mean {close[0]}?" if close else ""

@@ -16,7 +16,7 @@ from ..criticism.result import Criticism
 from ..criticism.source_summary import DifferingWindow, PourVerdict, SourceVerdict
 from ..criticism.summary import CriticismSummary
 from ..inference.criticism.verdict_kind import VerdictKind
-from ..models.numerics import TESTED_RATIO
+from ..models.numerics import is_tested
 from ..pouring.draining import TENTH, Hold
 from ..pouring.result import ActionSummary, GivenPour, GivenSummary, Pour
 from ..wording import (
@@ -103,9 +103,8 @@ def calibration_facts(calibration: Calibration) -> Facts:
 
 def _untested_cells(calibration: Calibration) -> str | None:
     """The stick's radius in cells, where it is none that was compared with references."""
-    low, high = TESTED_RATIO
     ratios = np.atleast_1d(calibration.tree.attrs.get("stick_radius_cells", [])).tolist()
-    return next((f"{ratio:.2f}" for ratio in ratios if not low <= ratio <= high), None)
+    return next((f"{ratio:.2f}" for ratio in ratios if not is_tested(ratio)), None)
 
 
 def fit_facts(summary: CalibrationSummary) -> Facts:

@@ -167,9 +167,10 @@ class Run:
         """
         differing = _differences(self.record, wanted)
         held, asked = differing.get(growing, (None, None))
-        if grows := (asked or 0) > (held or 0):
+        if grows := isinstance(held, int) and isinstance(asked, int) and asked > held:
             del differing[growing]
-        for field, (held, asked) in differing.items():
+        if differing:
+            field, (held, asked) = next(iter(differing.items()))
             if field.startswith("inputs."):
                 what = "is of other recordings"
                 fix = f"give those that {RUN_TOML} names under files, unchanged, or another `out`"
@@ -238,16 +239,11 @@ class Run:
         """
         tree, why = self._look(step)
         if tree is None:
-            for earlier in self._missing_before(step):
-                self.required(earlier)
+            for earlier in list(RESULTS)[: list(RESULTS).index(step)]:
+                if earlier == "calibrate" or self.why_not(earlier):  # a criticism is not needed
+                    self.required(earlier)
             raise InputError(why, where=str(self.path), fix=f"run: {self.again(step)}")
         return tree
-
-    def _missing_before(self, step: str) -> list[str]:
-        """Earlier steps that must be made again first: a run may do without a criticism."""
-        earlier = list(RESULTS)[: list(RESULTS).index(step)]
-        needed = [one for one in earlier if one == "calibrate" or self.why_not(one)]
-        return [one for one in needed if self.result(one) is None]
 
     def keep(
         self,
@@ -294,7 +290,9 @@ class Run:
     def again(self, step: str) -> str:
         """The command that makes a step's result, with the options of one that is readable."""
         if step == "calibrate":
-            clean = ["--baseline", "CLEAN..."] if "baseline" in self.record["inputs"] else []
+            clean = (
+                ["--baseline", "CLEAN..."] if "baseline" in self.record.get("inputs", {}) else []
+            )
             return self._calibrate_again(*clean, "--out", self.path, "--resume")
         try:
             made = json.loads(read_result(self.path / RESULTS[step]).attrs["made_from"])
@@ -311,7 +309,7 @@ class Run:
     def _calibrate_again(self, *words: object) -> str:
         """The command that calibrates on the kept recordings, with the settings of the run."""
         recordings = kept_paths(self.path, self.record) or ("RECORDING...",)
-        options = _options(self.record["settings"], asdict(CalibrationSettings()))
+        options = _options(self.record.get("settings", {}), asdict(CalibrationSettings()))
         return command("calibrate", *recordings, *words, *options)
 
     def _look(self, step: str) -> "tuple[DataTree | None, str]":

@@ -29,8 +29,8 @@ class Section:
         return _adapter(cls).validate_python(values)
 
     def to_json(self) -> dict[str, Any]:
-        """The section as `json.dumps` takes it; what is not finite is None."""
-        return _finite(_adapter(type(self)).dump_python(self, mode="json", by_alias=True))
+        """The section as `json.dumps` takes it; what is not finite (R-hat of one chain) is None."""
+        return json.loads(_adapter(type(self)).dump_json(self, by_alias=True))
 
 
 @cache
@@ -41,12 +41,3 @@ def _adapter(kind: type) -> TypeAdapter:
 def write_summary(path: Path, sections: Mapping[str, Any]) -> None:
     """Write all sections, by the names of their commands."""
     write_text(path, json.dumps(sections, indent=2, allow_nan=False) + "\n")
-
-
-def _finite(value: Any) -> Any:
-    """JSON has no NaN: what could not be computed (R-hat of one chain) becomes null."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

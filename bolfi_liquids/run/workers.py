@@ -5,7 +5,7 @@ Not by loky: with 3.7.0, workers go on for at least 20 s after their parent is k
 
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
@@ -30,18 +30,9 @@ def processes(count: int | None = None) -> Iterator[Executor | None]:
     if count == 1:
         yield None
         return
-    pool = ProcessPoolExecutor(
-        count,
-        mp_context=get_context("spawn"),
-        initializer=_begin,
-        initargs=(max(1, processors // count),),
-    )
-    try:
+    with _pool(count, _begin, max(1, processors // count)) as pool:
         yield pool
-    except BaseException:
-        _give_up(pool)
-        raise
-    pool.shutdown()
+        pool.shutdown()
 
 
 @contextmanager
@@ -53,20 +44,22 @@ def background_process(niceness: int) -> Iterator[Executor]:
     Args:
         niceness: How much is added to the niceness of this process.
     """
-    pool = ProcessPoolExecutor(
-        1, mp_context=get_context("spawn"), initializer=_begin_behind, initargs=(niceness,)
-    )
+    with _pool(1, _begin_behind, niceness) as pool:
+        yield pool
+
+
+@contextmanager
+def _pool(count: int, begin: Callable[[int], None], number: int) -> Iterator[Executor]:
+    """Spawned processes; what they have not finished at the end is given up."""
+    spawn = get_context("spawn")
+    pool = ProcessPoolExecutor(count, mp_context=spawn, initializer=begin, initargs=(number,))
     try:
         yield pool
     finally:
-        _give_up(pool)
-
-
-def _give_up(pool: ProcessPoolExecutor) -> None:
-    # there is no public way before Python 3.14
-    for worker in list((pool._processes or {}).values()):
-        worker.terminate()
-    pool.shutdown(cancel_futures=True)
+        # there is no public way before Python 3.14
+        for worker in list((pool._processes or {}).values()):
+            worker.terminate()
+        pool.shutdown(cancel_futures=True)
 
 
 def _begin(threads: int) -> None:

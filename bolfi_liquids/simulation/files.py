@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Argument, InputError
-from ..files import given_path, new_file, new_netcdf
+from ..files import given_path, new_file
 from ..inputs.fields import PLANES
 from ..inputs.recording import Recording, along_path, recording_dataset
 from ..movie.file import check_movie
@@ -50,16 +50,11 @@ def check_targets(movie: str | Path | None, out: str | Path | None) -> Targets:
     Raises:
         InputError, ImportError: Where and why.
     """
-    targets = Targets(
-        None if movie is None else given_path(movie, Argument("movie")),
-        None if out is None else given_path(out, Argument("out")),
-    )
-    if targets.movie is not None:
-        check_movie(targets.movie)
-        new_file(targets.movie)
-    if targets.out is not None:
-        new_netcdf(targets.out)
-    return targets
+    if movie is not None:
+        movie = given_path(movie, Argument("movie"))
+        check_movie(movie)
+        new_file(movie, Argument("movie"))
+    return Targets(movie, None if out is None else new_file(out, Argument("out"), suffix=".nc"))
 
 
 def stir_dataset(batch: Batch, recording: Recording, angles: NDArray) -> "Dataset":

@@ -35,7 +35,7 @@ from stirring_reference import (
     star,
 )
 
-from bolfi_liquids.files import given_path, new_netcdf, write_netcdf
+from bolfi_liquids.files import new_file, write_netcdf
 from bolfi_liquids.inputs.fields import AXES, PLANES
 from bolfi_liquids.inputs.open import open_recording
 from bolfi_liquids.inputs.recording import recording_dataset
@@ -50,7 +50,7 @@ CENTIMETRE = 0.01
 def main(arguments: list[str] | None = None) -> Path:
     """Make one recording; the file that was written."""
     given = _parser().parse_args(arguments)
-    out = new_netcdf(given_path(given.out, "OUT"))
+    out = new_file(given.out, "OUT", suffix=".nc")
     path, scene = _path(given), _scene(given)
     liquid = Liquid(given.viscosity, given.density, given.warming)
     resolution = Resolution(given.cell_mm * 1e-3, given.step_ms * 1e-3)

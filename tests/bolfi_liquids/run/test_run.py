@@ -121,6 +121,12 @@ def test_a_record_that_is_cut_off_is_named_though_it_is_toml(run):
         bl.Calibration.open(run.path)
 
 
+def test_what_is_no_run_has_no_result_and_says_what_makes_one(tmp_path):
+    (tmp_path / RUN_TOML).write_text("[a]\nb = 1\n", encoding="utf-8")
+    with pytest.raises(InputError, match="not finished; run: bolfi-liquids calibrate RECORDING"):
+        bl.choose_pour(tmp_path)
+
+
 def test_simulations_that_were_removed_are_missed(run, caplog):
     (run.path / SIMULATIONS).unlink()
     with run.bank() as bank:
