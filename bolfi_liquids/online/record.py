@@ -1,7 +1,6 @@
 """Recording and calibrating at the same time: the arm stirs until the pour is known well enough."""
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -71,7 +70,7 @@ def record_online(
         if not calibration.wait_until_ready():
             raise RuntimeError(f"the calibration is not ready: {calibration.status.detail}")
         with stirring(stir, "stirring and calibrating", progress) as (session, view):
-            _Stirring(session, stir.plan, calibration, view, online.told).carry_out()
+            _Stirring(session, stir.plan, calibration, view).carry_out()
         recording = finished(stir.task.out)
         calibration.finish(recording, progress=progress)
     return recording
@@ -86,11 +85,9 @@ class _Stirring:
         plan: StirPlan,
         calibration: OnlineCalibration,
         view: SessionView,
-        told: "Callable[[OnlineEstimate], None] | None",
     ):
         self._session, self._plan, self._view = session, plan, view
-        self._calibration, self._told = calibration, told
-        self._enough = False
+        self._calibration, self._enough = calibration, False
 
     def carry_out(self) -> None:
         """To the cup, strokes until it is enough, a rest, and out again."""
@@ -138,8 +135,6 @@ class _Stirring:
                 for fault in estimate.frame_faults:
                     self._view.warn(fault)
             self._view.say(sentence(estimate))
-            if self._told is not None:
-                self._told(estimate)
         self._view.show(self._session)
 
 

@@ -14,8 +14,7 @@ from ..calibration.bad_fit import bad_fit
 from ..calibration.result import Calibration
 from ..calibration.summary import CalibrationSummary, ParameterSummary, SamplerStatus
 from ..criticism.result import Criticism
-from ..criticism.source_summary import DifferingWindow, PourVerdict, SourceVerdict
-from ..criticism.summary import CriticismSummary
+from ..criticism.summary import CriticismSummary, DifferingWindow, PourVerdict, SourceVerdict
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..models.numerics import TESTED_RATIO
 from ..pouring.draining import TENTH, Hold

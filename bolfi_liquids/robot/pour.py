@@ -67,6 +67,11 @@ class ChosenPour:
                 "--despite-bad-fit (despite_bad_fit=True)",
             )
 
+    @property
+    def place(self) -> dict[str, float]:
+        """`distance` of the lip from the receiver's axis and `lip_height` above its floor [m]."""
+        return {"distance": self.judged.distance, "lip_height": self.cups.pour.lip_height}
+
     def __str__(self) -> str:
         """As a person reads it before the motion, what is wrong first."""
         return "\n".join([*([BAD_FIT] if self.fit_is_bad else []), self.expected])
@@ -133,12 +138,6 @@ class PourMotion(NamedTuple):
     ready: np.ndarray
     path: "PosePath"
 
-    @property
-    def place(self) -> dict[str, float]:
-        """`distance` of the lip from the receiver's axis and `lip_height` above its floor [m]."""
-        lip_height = self.chosen.cups.pour.lip_height
-        return {"distance": self.chosen.judged.distance, "lip_height": lip_height}
-
     def task(self, rig: "Rig") -> Task:
         """The motion for a session, recorded in a new directory of the run."""
         out = _next_directory(self.chosen.run.path)
@@ -155,29 +154,23 @@ def plan_pour(run: Run, rig: "Rig") -> PourMotion:
     """
     from ..hardware import check_path
     from ..hardware.motion import pour_path, ready_to_pour
-
-    chosen = chosen_pour(run)
-    _check_receiver(chosen, rig)
-    action, turn = chosen.judged, chosen.cups.pour
-    place = {"distance": action.distance, "lip_height": turn.lip_height}
-    path = pour_path(
-        rig,
-        angular_velocity=action.angular_velocity,
-        final_angle=turn.final_angle,
-        hold=turn.hold,
-        **place,
-    )
-    check_path(path, rig, "pouring")
-    return PourMotion(chosen, ready_to_pour(rig, **place), path)
-
-
-def _check_receiver(chosen: ChosenPour, rig: "Rig") -> None:
-    """Only the cups of the pour say how wide its receiver is."""
     from ..hardware.rig_checks import receiver_fault
 
+    chosen = chosen_pour(run)
+    # only the cups of the pour say how wide its receiver is
     if fault := receiver_fault(rig, chosen.cups.receiver.radius):
         fix = "move the receiver away, and correct the rig"
         raise InputError(fault, where="pouring.receiver", fix=fix)
+    turn = chosen.cups.pour
+    path = pour_path(
+        rig,
+        angular_velocity=chosen.judged.angular_velocity,
+        final_angle=turn.final_angle,
+        hold=turn.hold,
+        **chosen.place,
+    )
+    check_path(path, rig, "pouring")
+    return PourMotion(chosen, ready_to_pour(rig, **chosen.place), path)
 
 
 def execute_pour(
@@ -239,7 +232,7 @@ def _carried_out(plan: PourMotion, rig: "Rig", ask: Ask | None, progress: bool) 
             armed_session(task, by) as session,
             SessionView("pouring" if ask else "pouring, emulated", shown=progress) as view,
         ):
-            session.follow(approach_pour(rig, session.pose(), **plan.place))
+            session.follow(approach_pour(rig, session.pose(), **plan.chosen.place))
             view.until_done(session, session.follow(plan.path))
     except KeyboardInterrupt:
         left = f"look at {task.out}" if task.out.exists() else "nothing had moved"

@@ -10,8 +10,7 @@ import bolfi_liquids as bl
 from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.cli.printed import print_findings
 from bolfi_liquids.criticism.criticism_file import EffectStatus
-from bolfi_liquids.criticism.source_summary import PourVerdict, SourceVerdict
-from bolfi_liquids.criticism.summary import SuggestedExperiment
+from bolfi_liquids.criticism.summary import PourVerdict, SourceVerdict, SuggestedExperiment
 from bolfi_liquids.reporting.facts import DETECTABLE_SNR, criticism_facts
 from bolfi_liquids.reporting.prose import prose
 from bolfi_liquids.reporting.report import figures_of

@@ -12,7 +12,7 @@ import bolfi_liquids as bl
 from bolfi_liquids.calibration.bad_fit import bad_fit
 from bolfi_liquids.calibration.fit_figures import _rms_by
 from bolfi_liquids.calibration.summary import FitStatus
-from bolfi_liquids.criticism.source_summary import PourVerdict
+from bolfi_liquids.criticism.summary import PourVerdict
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring.draining import Hold
 from bolfi_liquids.pouring.figures import not_surely_worse
