@@ -27,8 +27,7 @@ from ..inputs.recording import Recording, Trajectory
 from ..run.compute import open_compute
 from ..simulators import RATE, Batched, PourSimulator, StirSimulator
 from .batch import batch_of, simulated
-from .files import check_targets, pour_dataset, stir_dataset
-from .movies import film_pour, film_stir
+from .files import check_targets, film_pour, film_stir, pour_dataset, stir_dataset
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -256,9 +255,8 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     targets.check_single(batch.single)
     outcome, particles = LandedParticles(angular_velocity), batch.one.particles
     simulator = PourSimulator(cups, density, outcome, particles=particles)
-    retained = slice(0, 1)  # what has not landed is NaN
     with open_compute(executor, timeout) as compute:
-        signals = simulated(simulator, batch, compute, retained)
+        signals = simulated(simulator, batch, compute)
     position = signals[:, 1:].reshape(len(signals), -1, 2).astype(np.float32)
     landings = Landings(position, signals[:, 0])
     action = PourAction(angular_velocity, distance)
