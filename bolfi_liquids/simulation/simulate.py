@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,18 +34,10 @@ if TYPE_CHECKING:
 
     from ..inference.simulations import Workers
     from ..models import Cups
+    from ..models.trajectory import PivotPath
 
 RIG_SIZES = (*LENGTHS, *STICK_WEIGHT)  # attributes of a recording that may be replaced
 PATTERN_SPEED = 0.1  # m/s, of a star or circle that is given by its name
-
-
-class TimedPath(Protocol):
-    """Times [s], shape (T,), and positions of the gripper [m], shape (T, 3)."""
-
-    @property
-    def time(self) -> NDArray[np.float64]: ...
-    @property
-    def position(self) -> NDArray[np.float64]: ...
 
 
 def simulate_stir(  # noqa: PLR0913  the one call that most users make
@@ -54,7 +46,7 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     *,
     density: float | None = None,
     effects: Mapping[str, float] | None = None,
-    path: str | TimedPath | None = None,
+    path: "str | PivotPath | None" = None,
     rig: Mapping[str, float] | None = None,
     recording: Source | None = None,
     particles: int = 0,
@@ -150,7 +142,7 @@ def _with_rig(
     return {name: value for name, value in attrs.items() if name not in replaced} | dict(rig)
 
 
-def _planned(recording: Recording, path: str | TimedPath | None) -> Recording:
+def _planned(recording: Recording, path: "str | PivotPath | None") -> Recording:
     """The recording with another path."""
     from ..hardware.motion import circle, star
 

@@ -242,7 +242,10 @@ def made_from():
     return MADE_FROM
 
 
-def _made(*, after=True, held=None, pours=False, status=("named", "rejected", "rejected")):
+STATUS = ("named", "rejected: the data still differ", "rejected: explains nothing")
+
+
+def _made(*, after=True, held=None, pours=False, status=STATUS):
     """A tree as `criticise` writes it: two recordings of 2 s, and maybe four pours."""
     rng = np.random.default_rng(0)
     frames, each = ("frame", "plane"), 20
