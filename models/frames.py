@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike
 
 from .liquid import Liquid
 from .number_checks import check_numbers, checked_seeds
-from .pouring import Landings, PourBatch, watched_landings
+from .pouring import Landings, PourBatch, landings
 from .pours.vessel import turned
 from .runtime import Watch
 from .stir_setup import StirSetup
-from .stirring import watched_stir
+from .stirring import stir
 from .trajectory import PivotPath
 
 FRAME_RATE = 25.0  # frames/s
@@ -88,7 +88,7 @@ def stir_frames(
         tip = pivot + setup.stick.length * direction.astype(np.float64)
         seen.append((start + step / scene.rate, position, pivot, tip))
 
-    angles = watched_stir(liquid, gripper, setup, [seed], effects, Watch(rate, look))
+    angles = stir(liquid, gripper, setup, [seed], effects, Watch(rate, look))
     time, position, pivot, tip = map(np.stack, zip(*seen, strict=True))
     if np.isnan(angles).any():
         position[:], tip[:] = np.nan, np.nan
@@ -125,7 +125,7 @@ def pour_frames(batch: PourBatch, *, rate: float = FRAME_RATE) -> PourFrames:
         whole[: len(half), 0], whole[: len(half), 1] = half, half * [1.0, -1.0, 1.0]
         seen.append((time, whole.reshape(-1, 3), angle))
 
-    landed = watched_landings(batch, Watch(rate, look))
+    landed = landings(*batch, Watch(rate, look))
     time, position, angle = map(np.stack, zip(*seen, strict=True))
     if np.isnan(landed.retained).any():
         position[:] = np.nan

@@ -122,20 +122,24 @@ def pour(
     return landed.into(distance, cups.receiver.radius)
 
 
-def landings(
+def landings(  # noqa: PLR0913  the fields of `PourBatch`, and what looks on
     liquid: Liquid,
     angular_velocity: ArrayLike,
     cups: Cups,
     seeds: ArrayLike,
     particles: int = 0,
     effects: Mapping[str, ArrayLike] | None = None,
+    watch: Watch | None = None,
 ) -> Landings:
     """Points at which the liquid lands, for receivers at any distance; arguments as for `pour`.
 
     `Landings.into` makes of them what `pour` would have returned, the receiver's distance and
-    radius in `cups` aside.
+    radius in `cups` aside. `watch` looks on at each scene.
     """
-    return watched_landings(PourBatch(liquid, angular_velocity, cups, seeds, particles, effects))
+    batch = PourBatch(liquid, angular_velocity, cups, seeds, particles, effects)
+    found, drop = _flights(batch, watch), cups.pour.lip_height - cups.receiver.height
+    position = np.stack([landing_of(flights, drop) for flights in found])
+    return Landings(position, np.array([flights.retained for flights in found]))
 
 
 class PourBatch(NamedTuple):
@@ -147,14 +151,6 @@ class PourBatch(NamedTuple):
     seeds: ArrayLike
     particles: int = 0
     effects: Mapping[str, ArrayLike] | None = None
-
-
-def watched_landings(batch: PourBatch, watch: Watch | None = None) -> Landings:
-    """Like `landings`, while `watch` looks at each of its scenes."""
-    found, cups = _flights(batch, watch), batch.cups
-    drop = cups.pour.lip_height - cups.receiver.height
-    position = np.stack([landing_of(flights, drop) for flights in found])
-    return Landings(position, np.array([flights.retained for flights in found]))
 
 
 def draining(batch: PourBatch, held: ArrayLike) -> np.ndarray:

@@ -22,6 +22,7 @@ def stir(
     setup: StirSetup,
     seeds: ArrayLike,
     effects: Mapping[str, ArrayLike] | None = None,
+    watch: Watch | None = None,
 ) -> np.ndarray:
     """Inclination of the stick while the gripper repeats its path in each liquid.
 
@@ -33,6 +34,7 @@ def stir(
         effects: Coefficients of `EFFECTS` by name, scalars or of shape [B]; they act in the
             alphabetical order of their names, those in the rig and in the liquid before those
             in the sensor.
+        watch: What looks on at each of its scenes.
 
     Returns:
         Angles [rad] from the downward vertical in the xz and yz planes at the gripper's times,
@@ -44,18 +46,6 @@ def stir(
     Warns:
         FailedSimulation: a simulation went wrong; its angles are NaN.
     """
-    return watched_stir(liquid, gripper, setup, seeds, effects)
-
-
-def watched_stir(
-    liquid: Liquid,
-    gripper: PivotPath,
-    setup: StirSetup,
-    seeds: ArrayLike,
-    effects: Mapping[str, ArrayLike] | None,
-    watch: Watch | None = None,
-) -> np.ndarray:
-    """Like `stir`, while `watch` looks at each of its scenes."""
     seeds = checked_seeds(seeds)
     size = len(seeds)
     acting = acting_in("stir", with_adhesion(liquid, effects, size), size)

@@ -41,13 +41,11 @@ from .sbc_pipelines import (
     Calibrate,
     FromBank,
     Observed,
-    SampleNoise,
 )
 
 if TYPE_CHECKING:
     from ..inference import Prior
     from ..inference.checks import Replicates
-    from ..inference.criticism import SumOfNoises
     from ..inference.simulations import Compute
 
 STIRS_PER_CALL = 16  # of the simulator, where there is no executor
@@ -135,37 +133,28 @@ class SbcStudy:
     def replicates(self, name: Surrogate) -> "Replicates":
         """Calibrations of stirs whose truths are known, by one of `SURROGATES`."""
         from .. import inference
+        from ..inference.criticism import KnownNoise, SumOfNoises
 
         calibration = self.settings.calibration(name)
-        observe: Any = SampleNoise(np.radians(self.settings.noise_deg))
+        noise: Any = KnownNoise(float(np.radians(self.settings.noise_deg)))
+        pipeline: Any = Calibrate(self.stirring, self.prior, calibration, self.compute.timeout)
         if name == "signal":
             # an error of the simulator is observed, and allowed for, as `calibrate` does
-            observe = Observed(self._noise)
-            pipeline: Any = FromBank(
-                self.stirring, self.prior, *self.stirs_everywhere(), calibration, observe.noise
-            )
-        else:
-            pipeline = Calibrate(self.stirring, self.prior, calibration, self.compute.timeout)
+            noise = SumOfNoises((noise, model_error(self.stirring, 0.0).usual))
+            shared = self.stirs_everywhere()
+            pipeline = FromBank(self.stirring, self.prior, *shared, calibration, noise)
         return inference.replicates(
             pipeline,
             self.stirring.batched,
             self.prior,
             self.settings.replicates[name],
             seed=self.settings.seed,
-            observe=observe,
+            observe=Observed(noise),
             executor=self.compute.executor,
             store=self.out / f"{name}.sqlite",
             identity=self.stirring.identity,
             progress=self.progress,
         )
-
-    @property
-    def _noise(self) -> "SumOfNoises":
-        """Of the cameras, and the largest error of the simulator."""
-        from ..inference.criticism import KnownNoise, SumOfNoises
-
-        cameras = KnownNoise(float(np.radians(self.settings.noise_deg)))
-        return SumOfNoises((cameras, model_error(self.stirring, 0.0).usual))
 
     def stirs_everywhere(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Points that fill the prior, and `RUNS_PER_POINT` stirs of each.

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from xarray import DataTree
 
     from ..inference import Prior
-    from ..inference.criticism import SumOfNoises
+    from ..inference.criticism import Noise, SumOfNoises
 
 SAMPLING: dict[str, Any] = {"sampler": "quadrature", "chains": 2, "draws": 250}
 """Of the posterior: independent draws, which take less time; `calibrate` checks its own against the
@@ -25,28 +25,14 @@ same quadrature."""
 
 
 @dataclass(frozen=True)
-class SampleNoise:
-    """Independent Gaussian noise in every sample.
-
-    Attributes:
-        sd: [rad].
-    """
-
-    sd: float
-
-    def __call__(self, signal: NDArray, rng: np.random.Generator) -> NDArray[np.float64]:
-        return signal + rng.normal(0.0, self.sd, signal.shape)
-
-
-@dataclass(frozen=True)
 class Observed:
     """Draws of a noise model over a whole signal.
 
     Attributes:
-        noise: Of the cameras and of the simulator's own error [rad].
+        noise: Of the cameras, and perhaps of the simulator's own error [rad].
     """
 
-    noise: "SumOfNoises"
+    noise: "Noise"
 
     def __call__(self, signal: NDArray, rng: np.random.Generator) -> NDArray[np.float64]:
         from ..inference.criticism.measurement_noise import samples

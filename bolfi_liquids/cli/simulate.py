@@ -162,9 +162,12 @@ def _tell(made: "Dataset", how: str) -> None:
 
     from ..inputs.described_liquid import Described
 
-    names = ("viscosity", "cohesion", "liquid_density", "effects", "particles", "seed")
-    *numbers, effects, particles, seed = (made.attrs[name] for name in names)
-    liquid = Described(*map(float, numbers), json.loads(effects), int(particles), int(seed))
+    of = made.attrs
+    viscosity, cohesion, density = map(
+        float, (of["viscosity"], of["cohesion"], of["liquid_density"])
+    )
+    effects, count, seed = json.loads(of["effects"]), int(of["particles"]), int(of["seed"])
+    liquid = Described(viscosity, cohesion, density, effects, count, seed)
     typer.echo("\n".join([*liquid.lines(), how]))
 
 

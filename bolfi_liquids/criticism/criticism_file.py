@@ -43,7 +43,8 @@ class EffectStatus(StrEnum):
     POSSIBLE = "possible"
     LESS_LIKELY = "less likely"
     REFUTED = "refuted by held-out data"
-    REJECTED = "rejected"
+    GAINS_NOTHING = "rejected: explains nothing"
+    STILL_DIFFERS = "rejected: the data still differ"
     NOT_NEEDED = "not needed"
     NOT_REFITTED = "untested by a refit"
     FAILED = "untested: its simulations failed"
@@ -198,11 +199,14 @@ def _status(
     candidate: "inference.criticism.Candidate", source: "inference.criticism.Criticism"
 ) -> EffectStatus:
     """What became of an explanation by one effect."""
+    from ..inference.criticism.verdict import MIN_GAIN
+
     if candidate.names[0] in source.verdict.effects:
         named = source.verdict.kind == VerdictKind.EFFECT
         return EffectStatus.NAMED if named else EffectStatus.POSSIBLE
     if not candidate.passes:
-        return EffectStatus.REJECTED
+        explains = candidate.gain > MIN_GAIN
+        return EffectStatus.STILL_DIFFERS if explains else EffectStatus.GAINS_NOTHING
     if candidate.names in source.refuted:
         return EffectStatus.REFUTED
     if not candidate.refitted:

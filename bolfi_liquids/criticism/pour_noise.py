@@ -22,6 +22,11 @@ ACTION_STEP = 0.5, 0.007
 """Differences that count as distance 1: of the log of the angular velocity; of distances [m]."""
 
 
+def action_coordinates(angular_velocity: NDArray, distance: NDArray) -> NDArray[np.float64]:
+    """Actions [rad/s], [m] in `ACTION_STEP`, shape (n, 2)."""
+    return np.column_stack([np.log(angular_velocity), distance]) / ACTION_STEP
+
+
 @dataclass(frozen=True, eq=False)
 class PourNoise:
     """Noise of the spilled and retained fractions of pours, correlated between like actions.
@@ -40,7 +45,7 @@ class PourNoise:
 
     def covariance(self, at) -> NDArray[np.float64]:
         """[n, n] of n fractions; `at` holds each one's pour (channel) and outcome (sample)."""
-        actions = np.column_stack([np.log(self.angular_velocity), self.distance]) / ACTION_STEP
+        actions = action_coordinates(self.angular_velocity, self.distance)
         apart = np.sum((actions[at.channel, None] - actions[at.channel]) ** 2, axis=-1)
         sd, length = np.array([SIMULATOR_ERROR_SD, CORRELATION_LENGTH])[:, at.sample]
         missed = np.exp(-0.5 * apart / np.outer(length, length)) * np.outer(sd, sd)

@@ -134,7 +134,7 @@ class Criticism:
 
     def plot_scores(self, source: str = "stirs", axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """How well each effect alone would explain the difference."""
-        from .effect_figures import score_plot
+        from .figures import score_plot
 
         return shown(partial(score_plot, self.tree.children[source]), axes)
 
@@ -142,7 +142,7 @@ class Criticism:
         self, source: str = "stirs", axes: "ArrayLike | None" = None
     ) -> "NDArray[Any]":
         """Which effects these data cannot distinguish: cosines between their signatures."""
-        from .effect_figures import confusion_plot
+        from .figures import confusion_plot
 
         return shown(partial(confusion_plot, self.tree.children[source]), axes)
 
@@ -152,7 +152,7 @@ class Criticism:
         Raises:
             ValueError: no effect was accepted.
         """
-        from .effect_figures import coefficient_plot
+        from .figures import coefficient_plot
 
         if not self.summary.accepted:
             raise ValueError("no effect was accepted, so there is no coefficient to plot")

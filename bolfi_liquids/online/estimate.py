@@ -88,9 +88,8 @@ class OnlineEstimate(NamedTuple):
 
     def is_enough(self, settings: OnlineSettings) -> bool:
         """Whether the pour is known well enough for stirring to end; never by a bad fit."""
-        spillage = self.spillage_q95 if settings.stop == "bound" else self.expected_spillage
         enough_strokes = self.strokes >= settings.least_strokes
-        return self.fits and enough_strokes and spillage < settings.target
+        return self.fits and enough_strokes and self.spillage_q95 < settings.target
 
 
 Made = tuple[tuple["Job", "Simulation"], ...]
@@ -270,16 +269,15 @@ def _engine(problem: Problem, made: Made, observed: NDArray, seed: int) -> "Bolf
     from ..inference import Bolfi
     from ..inference.simulations import columns, stacked
 
-    settings = problem.settings
     paper: dict[str, Any] = PAPER_RULES
     engine = Bolfi(
         problem.prior,
         observed,
-        surrogate=settings.surrogate,
+        surrogate="discrepancy",
         seed=seed,
         initial=MIN_SIMULATIONS,
         discrepancy=problem.stirring.discrepancy(),
-        **(paper if settings.surrogate == "discrepancy" else {}),
+        **paper,
     )
     if made:
         theta, seeds = columns([job for job, _ in made])

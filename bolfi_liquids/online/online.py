@@ -24,7 +24,7 @@ from ..errors import Argument, InputError
 from ..files import given_path
 from ..inputs.cups import bundled_cups
 from ..inputs.open import Source
-from ..inputs.prior import check_prior, default_prior, describe_prior, read_prior
+from ..inputs.prior import default_prior
 from ..inputs.recording import planned_recording
 from ..pouring.design import joint_prior, whole
 from ..pouring.landed_pours import Parcels, pours_in
@@ -39,7 +39,6 @@ from .plan import Aligned, PartialRecording, stroke_ends
 from .settings import OnlineSettings
 
 if TYPE_CHECKING:
-    from ..inference import Prior
     from ..inference.simulations import Job
     from ..models import Cups
     from ..models.trajectory import PivotPath
@@ -58,20 +57,13 @@ class OnlineChoice(NamedTuple):
         run: The RUN directory to be made.
         cups: Source and receiver of the pour; None takes the bundled ones.
         settings: Target and engine.
-        bank: Simulations to reuse and to keep: pours of the same cups and density, and the design
-            of the same plan, rig and density. None is a file in `run`.
-        prior: Prior of `viscosity` [Pa s] and `cohesion` [1]; None is `default_prior()`.
         cycles: How often the pattern is stirred at the most, by `record_online`.
-        told: Called by `record_online` with each estimate.
     """
 
     run: Path
     cups: "Cups | None" = None
     settings: OnlineSettings = OnlineSettings()
-    bank: Path | None = None
-    prior: "Prior | None" = None
     cycles: int = USUAL_CYCLES
-    told: Callable[[OnlineEstimate], None] | None = None
 
 
 class OnlinePhase(StrEnum):
@@ -179,20 +171,17 @@ class OnlineCalibration:
             progress: Whether to show a bar on stderr while pours are made.
 
         Raises:
-            InputError: The plan, the prior or the directory of the run cannot be used.
+            InputError: The plan or the directory of the run cannot be used.
         """
         from ..inference import SimulationBank
         from ..inference.simulations import Compute
 
-        settings = choice.settings
-        prior = default_prior() if choice.prior is None else choice.prior
-        check_prior(prior)
-        prior = read_prior(describe_prior(prior))  # as `finish` writes it down
+        settings, prior = choice.settings, default_prior()
         cups = bundled_cups() if choice.cups is None else choice.cups
         plan = planned_recording(path.time, path.position, attrs)
         problem = Problem(prior, stir_simulator([plan], settings.particles), settings)
         out = given_path(choice.run, Argument("run"))
-        bank = out / BANK if choice.bank is None else Path(choice.bank)
+        bank = out / BANK
         pours = PourSimulator(cups, plan.number("liquid_density"), Parcels())
         with ExitStack() as resources:
             resources.enter_context(alone_in(out))
@@ -257,10 +246,9 @@ class OnlineCalibration:
         calibration = calibrate(
             recording,
             out=self.out,
-            prior=self._problem.prior,
             budget=budget,
             seed=self.settings.seed,
-            surrogate=self.settings.surrogate,
+            surrogate="discrepancy",
             particles=self.settings.particles,
             progress=progress,
         )

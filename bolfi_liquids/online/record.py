@@ -1,7 +1,7 @@
 """Recording and calibrating at the same time: the arm stirs until the pour is known well enough."""
 
 import time
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,13 +11,13 @@ from ..inputs.recording import Recording
 from ..robot.armed_session import Ask
 from ..robot.live_view import SessionView
 from ..robot.record import finished, prepared, stirring
-from ..robot.stir import PATHS_AHEAD, StirPlan
+from ..robot.stir import StirPlan, follow_plan
 from .online import OnlineCalibration, OnlineChoice, OnlinePhase
 from .plan import PartialRecording
 
 if TYPE_CHECKING:
     from ..hardware import HiddenLiquid, Rig, Session
-    from ..hardware.motion import PosePath, Trajectory
+    from ..hardware.motion import Trajectory
     from .estimate import OnlineEstimate
 
 BAD_FIT = (
@@ -71,76 +71,43 @@ def record_online(
         if not calibration.wait_until_ready():
             raise RuntimeError(f"the calibration is not ready: {calibration.status.detail}")
         with stirring(stir, "stirring and calibrating", progress) as (session, view):
-            _Stirring(session, stir.plan, calibration, view, online.told).carry_out()
+            follow_plan(session, stir.plan, _Learning(session, calibration, view).wait)
         recording = finished(stir.task.out)
         calibration.finish(recording, progress=progress)
     return recording
 
 
-class _Stirring:
-    """The stir stroke by stroke, with what is learned meanwhile."""
+@dataclass
+class _Learning:
+    """What is learned while the arm stirs."""
 
-    def __init__(
-        self,
-        session: "Session",
-        plan: StirPlan,
-        calibration: OnlineCalibration,
-        view: SessionView,
-        told: "Callable[[OnlineEstimate], None] | None",
-    ):
-        self._session, self._plan, self._view = session, plan, view
-        self._calibration, self._told = calibration, told
-        self._enough = False
+    session: "Session"
+    calibration: OnlineCalibration
+    view: SessionView
+    enough: bool = False
 
-    def carry_out(self) -> None:
-        """To the cup, strokes until it is enough, a rest, and out again."""
-        from ..hardware.motion import approach, retract
-
-        session = self._session
-        session.follow(approach(session.rig, session.pose()))
-        self._view.until_done(session, session.follow(self._plan.insert))
-        last = self._stir()
-        # the recording ends with a rest, as the plan's last stroke does
-        place = self._plan.strokes[last].pose[-1]
-        if last + 1 < len(self._plan.strokes):
-            session.follow(_still(session.rig, place))
-        self._view.until_done(session, session.follow(retract(session.rig, place[:3])))
-
-    def _stir(self) -> int:
-        """Follow strokes until it is enough; the last one's place in the plan."""
-        ordered: list[int] = []
-        for at, stroke in enumerate(self._plan.strokes):
-            ordered.append(self._session.follow(stroke))
-            if at >= PATHS_AHEAD:
-                self._await(ordered[at - PATHS_AHEAD])
-            if self._enough:
-                break
-        for number in ordered[-PATHS_AHEAD:]:
-            self._await(number)
-        return len(ordered) - 1
-
-    def _await(self, number: int) -> None:
-        """Wait for a stroke's end, and hand over the data so far."""
-        while not self._session.wait(number, timeout=0.05):
-            self._take(self._calibration.poll())
+    def wait(self, number: int) -> bool:
+        """Wait for a path's end, and hand over the data so far; whether the pour is known well
+        enough."""
+        while not self.session.wait(number, timeout=0.05):
+            self._take(self.calibration.poll())
         time.sleep(FOLLOWED_AFTER)
-        if (so_far := _so_far(self._session.directory, time.monotonic())) is not None:
-            self._take(self._calibration.update(so_far))
+        if (so_far := _so_far(self.session.directory, time.monotonic())) is not None:
+            self._take(self.calibration.update(so_far))
+        return self.enough
 
     def _take(self, estimate: "OnlineEstimate | None") -> None:
-        status = self._calibration.status
+        status = self.calibration.status
         if status.detail and status.phase is not OnlinePhase.PREPARING:
-            self._view.warn(f"calibration {status.phase}: {status.detail}")
+            self.view.warn(f"calibration {status.phase}: {status.detail}")
         if estimate is not None:
-            self._enough = estimate.is_enough(self._calibration.settings)
+            self.enough = estimate.is_enough(self.calibration.settings)
             if not estimate.fits:
-                self._view.warn(BAD_FIT)
+                self.view.warn(BAD_FIT)
                 for fault in estimate.frame_faults:
-                    self._view.warn(fault)
-            self._view.say(sentence(estimate))
-            if self._told is not None:
-                self._told(estimate)
-        self._view.show(self._session)
+                    self.view.warn(fault)
+            self.view.say(sentence(estimate))
+        self.view.show(self.session)
 
 
 def sentence(estimate: "OnlineEstimate") -> str:
@@ -166,14 +133,6 @@ def _simulated(plan: StirPlan) -> "Trajectory":
     times = np.arange(0.0, whole.duration, 1.0 / PLAN_RATE)
     columns = [np.interp(times, whole.time, axis) for axis in whole.pose[:, :3].T]
     return Trajectory(times, np.column_stack(columns))
-
-
-def _still(rig: "Rig", pose: np.ndarray) -> "PosePath":
-    """The rest at the end of a stir that ends early."""
-    from ..hardware.motion import PosePath
-
-    times = np.arange(0.0, rig.stirring.rest, 1.0 / rig.robot.rate)
-    return PosePath(times, np.tile(pose, (len(times), 1)), stirring=True)
 
 
 def _so_far(directory: Path, ended: float) -> PartialRecording | None:

@@ -1,6 +1,6 @@
 """What decides an online calibration besides plan, cups and data."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
@@ -14,7 +14,6 @@ from ..inputs.settings import (
     Particles,
     Seed,
     Simulations,
-    Surrogate,
     checked,
 )
 
@@ -26,27 +25,22 @@ class OnlineSettings:
     """What decides an online calibration besides plan, cups and data.
 
     Attributes:
-        target: Spilled fraction under which stirring may end.
-        stop: What must be under it: "bound", the spilled fraction that one pour in twenty exceeds,
-            or "mean", the expected one.
+        target: Stirring may end where only one pour in twenty spills more than this fraction.
         least_strokes: Strokes that must be finished before stirring may end. After the first ones
             the posterior is often wide, and sometimes wrong: nine see the cup from all sides.
         design: Simulations all over the prior, made before the robot moves.
         budget: Simulations in all.
         in_flight: Simulations made together while the robot stirs; each occupies a core.
-        surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
         particles: Number of particles of the simulated liquid; 0: cells follow the stick.
         pours: Number of pours from which a map of landings is learned, of all liquids of the prior.
         seed: Seed of all random draws.
     """
 
     target: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.05
-    stop: Literal["bound", "mean"] = "bound"
     least_strokes: Count = 9
     design: Simulations = 16
     budget: Simulations = 48
     in_flight: Count = 1
-    surrogate: Surrogate = "discrepancy"
     particles: Particles = 0
     pours: Annotated[Integer, Field(ge=MIN_MAP_POURS, le=MAX_COUNT)] = PRIOR_POURS
     seed: Seed = 0

@@ -5,10 +5,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..criticism.pour_noise import CORRELATION_LENGTH, SIMULATOR_ERROR_SD
+from ..criticism.pour_noise import (
+    CORRELATION_LENGTH,
+    SIMULATOR_ERROR_SD,
+    action_coordinates,
+)
 from ..inputs.pour_table import PourTable
 from ..seeds import Phase, generator
-from .residual import Residual, angle, coordinates, expected_share, learn_residual, share
+from .residual import Residual, angle, expected_share, learn_residual, share
 from .result import CONTRADICTION, ActionSummary, GivenPour, GivenSummary, Judged
 from .spillage import Surface, normal_scores
 
@@ -38,7 +42,7 @@ class GivenPours:
             there: What the map says of them.
             here: What it says of the given pours, for the same draws, shape (draws, A).
         """
-        at = coordinates(
+        at = action_coordinates(
             np.repeat(there.angular_velocity, len(there.distance)),
             np.tile(there.distance, len(there.angular_velocity)),
         )
@@ -97,7 +101,7 @@ class GivenPours:
 
 def _coordinates_of(judged: Judged) -> NDArray[np.float64]:
     """Shape (1, 2)."""
-    return coordinates(np.array([judged.angular_velocity]), np.array([judged.distance]))
+    return action_coordinates(np.array([judged.angular_velocity]), np.array([judged.distance]))
 
 
 def learn_given(table: PourTable, spilled: NDArray, retained: NDArray) -> GivenPours:
@@ -108,7 +112,7 @@ def learn_given(table: PourTable, spilled: NDArray, retained: NDArray) -> GivenP
         spilled, retained: Fractions that the map predicts of each, for draws of the liquid, shape
             (draws, A).
     """
-    at = coordinates(table.angular_velocity, table.distance)
+    at = action_coordinates(table.angular_velocity, table.distance)
     kinds = zip(
         table.observed, (spilled, retained), SIMULATOR_ERROR_SD, CORRELATION_LENGTH, strict=True
     )

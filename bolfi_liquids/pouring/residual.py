@@ -15,16 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..criticism.pour_noise import ACTION_STEP, REPEATABILITY_SD
+from ..criticism.pour_noise import REPEATABILITY_SD
 
 LOG_PRIOR_SD = 1.0, 0.5, 0.5
 """Of the logs of the process's standard deviation and of its two lengths."""
 NODES = 7  # at which an expectation over the process is computed
-
-
-def coordinates(angular_velocity: NDArray, distance: NDArray) -> NDArray[np.float64]:
-    """Actions [rad/s], [m] as the process sees them, in `ACTION_STEP`, shape (n, 2)."""
-    return np.column_stack([np.log(angular_velocity), distance]) / ACTION_STEP
 
 
 def angle(share: NDArray) -> NDArray[np.float64]:
@@ -48,7 +43,7 @@ class Residual(NamedTuple):
     """Of one share that was observed in A given pours; see `learn_residual`.
 
     Attributes:
-        at: `coordinates` of the given pours, shape (A, 2).
+        at: `action_coordinates` of the given pours, shape (A, 2).
         observed: Angles of their shares, shape (A,).
         sd: Of the process.
         lengths: Of its correlation along both coordinates, shape (2,).
@@ -67,7 +62,7 @@ class Residual(NamedTuple):
         Args:
             here: Angles that the outcomes predict of the given pours, shape (n, A).
             there: Angles that they predict of the actions, shape (n, m).
-            at: `coordinates` of the actions, shape (m, 2).
+            at: `action_coordinates` of the actions, shape (m, 2).
 
         Returns:
             Mean angles, shape (n, m), none beyond nothing or all; the sd of a pour about each,
@@ -106,7 +101,7 @@ def learn_residual(
     """The process that most probably separates outcomes from given pours.
 
     Args:
-        at: `coordinates` of the given pours, shape (A, 2).
+        at: `action_coordinates` of the given pours, shape (A, 2).
         observed: Angles of their shares, shape (A,).
         here: Angles that n outcomes predict of them, shape (n, A).
         sd, lengths: Medians of the process's prior.

@@ -13,8 +13,7 @@ import numpy as np
 from ..calibration.result import Calibration
 from ..calibration.summary import CalibrationSummary, ParameterSummary, SamplerStatus, bad_fit
 from ..criticism.result import Criticism
-from ..criticism.source_summary import DifferingWindow, PourVerdict, SourceVerdict
-from ..criticism.summary import CriticismSummary
+from ..criticism.summary import CriticismSummary, DifferingWindow, PourVerdict, SourceVerdict
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..models.numerics import is_tested
 from ..pouring.draining import TENTH, Hold

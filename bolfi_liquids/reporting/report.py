@@ -8,8 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..calibration.figures import draw_fit, draw_posterior, draw_search, draw_strokes
-from ..criticism.effect_figures import coefficient_plot, confusion_plot, score_plot
-from ..criticism.figures import held_out_plot, pour_residual_plot, residual_plot, stroke_plot
+from ..criticism.figures import (
+    coefficient_plot,
+    confusion_plot,
+    held_out_plot,
+    pour_residual_plot,
+    residual_plot,
+    score_plot,
+    stroke_plot,
+)
 from ..criticism.result import Criticism
 from ..drawing import styled, to_svg
 from ..files import write_text

@@ -1,14 +1,12 @@
 """The stir of a hidden liquid: simulated before the session, replayed by the emulated arm."""
 
-import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from ..errors import InputError
 from ..inputs.described_liquid import COHESION
 from ..inputs.recording import planned_recording
+from ..simulation.batch import batch_of, simulated
 from ..simulators import stir_simulator
 from .stir import StirPlan
 
@@ -33,21 +31,20 @@ def with_stir(rig: "Rig", plan: StirPlan, liquid: "HiddenLiquid") -> "HiddenLiqu
     from ..hardware import StickMotion, servoed
     from ..hardware.motion import joined
     from ..hardware.recorder.finalise import rig_attributes
+    from ..inference.simulations import Compute
 
     if liquid.stir is not None:
         return liquid
     path = servoed(joined(list(plan.strokes)))
     expected = planned_recording(path.time, path.position, rig_attributes(rig))
-    simulator = stir_simulator([expected], 0)
-    theta = {"viscosity": np.array([liquid.viscosity]), "cohesion": np.array([COHESION])}
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        (inclination,) = simulator.simulate(theta, np.array([liquid.seed]))
-    if not np.isfinite(inclination).all():
-        why = "; ".join(str(one.message) for one in told)
+    of = {"viscosity": liquid.viscosity, "cohesion": COHESION, "density": rig.liquid.density}
+    batch = batch_of(of, {}, 0, liquid.seed)
+    try:
+        (inclination,) = simulated(stir_simulator([expected], 0), batch, Compute())
+    except RuntimeError as err:
         raise InputError(
-            f"{liquid.viscosity:g} Pa s cannot be stirred along the rig's path: {why}",
+            f"{liquid.viscosity:g} Pa s cannot be stirred along the rig's path: {err}",
             where="emulated viscosity",
             fix="give another viscosity, or another path under [stirring] of rig.toml",
-        )
+        ) from err
     return replace(liquid, stir=StickMotion(path.time, path.position, inclination))

@@ -4,7 +4,7 @@ import json
 import logging
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,7 +22,6 @@ from .live_view import SessionView
 
 if TYPE_CHECKING:
     from ..hardware import Check, HiddenLiquid, Rig
-    from ..hardware.motion import PosePath
 
 logger = logging.getLogger(__name__)
 
@@ -65,6 +64,11 @@ class ChosenPour:
                 fix="correct the recording, calibrate and choose again, or pour nevertheless: "
                 "--despite-bad-fit (despite_bad_fit=True)",
             )
+
+    @property
+    def place(self) -> dict[str, float]:
+        """`distance` of the lip from the receiver's axis and `lip_height` above its floor [m]."""
+        return {"distance": self.judged.distance, "lip_height": self.cups.pour.lip_height}
 
     def __str__(self) -> str:
         """As a person reads it before the motion, what is wrong first."""
@@ -119,64 +123,33 @@ def _check_ranges(run: Run, chosen: Judged, cups: "Cups") -> None:
             )
 
 
-class PourMotion(NamedTuple):
-    """A pour as a motion.
-
-    Attributes:
-        chosen: What is carried out.
-        ready: Lip above the place of the pour, in the cup's frame, shape (6,).
-        path: From there, down, the turn, back upright and up again.
-    """
-
-    chosen: ChosenPour
-    ready: np.ndarray
-    path: "PosePath"
-
-    @property
-    def place(self) -> dict[str, float]:
-        """`distance` of the lip from the receiver's axis and `lip_height` above its floor [m]."""
-        lip_height = self.chosen.cups.pour.lip_height
-        return {"distance": self.chosen.judged.distance, "lip_height": lip_height}
-
-    def task(self, rig: "Rig") -> Task:
-        """The motion for a session, recorded in a new directory of the run."""
-        out = _next_directory(self.chosen.run.path)
-        return Task(rig, "pouring", [self.path], out, about=str(self.chosen))
-
-
-def plan_pour(run: Run, rig: "Rig") -> PourMotion:
-    """The motion of the pour that a run has chosen.
+def plan_pour(chosen: ChosenPour, rig: "Rig") -> Task:
+    """The motion of a pour: down, the turn, back upright and up again; it will be recorded in a new
+    directory of the run.
 
     Raises:
-        InputError: The run has chosen none, or none that may be carried out, or its receiver stands
-            in the cup that is stirred.
+        InputError: Its receiver stands in the cup that is stirred.
         MotionRejected: The motion breaks one of the rig's limits.
     """
     from ..hardware import check_path
-    from ..hardware.motion import pour_path, ready_to_pour
-
-    chosen = chosen_pour(run)
-    _check_receiver(chosen, rig)
-    action, turn = chosen.judged, chosen.cups.pour
-    place = {"distance": action.distance, "lip_height": turn.lip_height}
-    path = pour_path(
-        rig,
-        angular_velocity=action.angular_velocity,
-        final_angle=turn.final_angle,
-        hold=turn.hold,
-        **place,
-    )
-    check_path(path, rig, "pouring")
-    return PourMotion(chosen, ready_to_pour(rig, **place), path)
-
-
-def _check_receiver(chosen: ChosenPour, rig: "Rig") -> None:
-    """Only the cups of the pour say how wide its receiver is."""
+    from ..hardware.motion import pour_path
     from ..hardware.rig_checks import receiver_fault
 
+    # only the cups of the pour say how wide its receiver is
     if fault := receiver_fault(rig, chosen.cups.receiver.radius):
         fix = "move the receiver away, and correct the rig"
         raise InputError(fault, where="pouring.receiver", fix=fix)
+    turn = chosen.cups.pour
+    path = pour_path(
+        rig,
+        angular_velocity=chosen.judged.angular_velocity,
+        final_angle=turn.final_angle,
+        hold=turn.hold,
+        **chosen.place,
+    )
+    check_path(path, rig, "pouring")
+    out = _next_directory(chosen.run.path)
+    return Task(rig, "pouring", [path], out, about=str(chosen))
 
 
 def execute_pour(
@@ -214,32 +187,33 @@ def execute_pour(
     check_consent(ask, emulate, "execute_pour")
     rig = rig_of(rig)
     with Run.entered(run) as opened:
-        plan = plan_pour(opened, rig)
+        chosen = chosen_pour(opened)
+        task = plan_pour(chosen, rig)
         if isinstance(run, Pour):
             run.check_current(opened)
         if ask is not None:
-            plan.chosen.check_fit(despite_bad_fit=despite_bad_fit)
+            chosen.check_fit(despite_bad_fit=despite_bad_fit)
         else:  # nobody is asked, who would read it first
-            if plan.chosen.fit_is_bad:
+            if chosen.fit_is_bad:
                 logger.warning(BAD_FIT)
-            logger.info(plan.chosen.expected)
-        return _carried_out(plan, rig, ask, progress)
+            logger.info(chosen.expected)
+        return _carried_out(chosen, task, ask, progress)
 
 
-def _carried_out(plan: PourMotion, rig: "Rig", ask: Ask | None, progress: bool) -> Path:
+def _carried_out(chosen: ChosenPour, task: Task, ask: Ask | None, progress: bool) -> Path:
     """The directory of what an arm did, or an emulated one."""
     from ..hardware import SessionInterrupted, emulated
-    from ..hardware.motion import approach_pour
+    from ..hardware.motion import approach_pour, ready_to_pour
 
-    task = plan.task(rig)
-    by = ask or emulated(rig, plan.ready, tool="pouring")
+    rig, (path,) = task.rig, task.paths
+    by = ask or emulated(rig, ready_to_pour(rig, **chosen.place), tool="pouring")
     try:
         with (
             armed_session(task, by) as session,
             SessionView("pouring" if ask else "pouring, emulated", shown=progress) as view,
         ):
-            session.follow(approach_pour(rig, session.pose(), **plan.place))
-            view.until_done(session, session.follow(plan.path))
+            session.follow(approach_pour(rig, session.pose(), **chosen.place))
+            view.until_done(session, session.follow(path))
     except KeyboardInterrupt:
         left = f"look at {task.out}" if task.out.exists() else "nothing had moved"
         raise SessionInterrupted(f"interrupted, the arm was stopped; {left}") from None
@@ -250,9 +224,9 @@ def dry_pour(run: RunOrPath, rig: "Rig") -> "tuple[str, list[Check]]":
     """What the arm would do, and the pre-flight list of a session that cannot move it.
 
     Raises:
-        InputError, MotionRejected: As `plan_pour`.
+        InputError, MotionRejected: As `chosen_pour` and `plan_pour`.
     """
-    return dry_run(plan_pour(Run.open(run), rig).task(rig))
+    return dry_run(plan_pour(chosen_pour(Run.open(run)), rig))
 
 
 def _next_directory(run: Path) -> Path:

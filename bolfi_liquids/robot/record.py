@@ -56,7 +56,13 @@ def record(
     stir = prepared(rig, out, ask, emulate, cycles)
     title = "stirring" if ask else "stirring, emulated"
     with stirring(stir, title, progress) as (session, view):
-        follow_plan(session, stir.plan, view)
+        view.motions = 1 + len(stir.task.paths)
+
+        def wait(number: int) -> bool:
+            view.until_done(session, number)
+            return False
+
+        follow_plan(session, stir.plan, wait)
     return finished(stir.task.out)
 
 

@@ -1,12 +1,14 @@
 """A stir carried out: by the robot, or by an emulated arm with rendered cameras."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from ..errors import Argument, InputError
 from ..inputs.start import REST_TIME, SETTLING_TIME
 from .armed_session import Task
-from .live_view import SessionView
 
 if TYPE_CHECKING:
     from ..hardware import Rig, Session
@@ -74,20 +76,46 @@ def stir_task(rig: "Rig", plan: StirPlan, out: Path) -> Task:
     return Task(rig, "stirring", plan.paths, out, cameras=True)
 
 
-def follow_plan(session: "Session", plan: StirPlan, view: SessionView) -> None:
-    """From where the arm is: to the cup, the stir, and out again.
+def follow_plan(session: "Session", plan: StirPlan, wait: Callable[[int], bool]) -> None:
+    """From where the arm is: to the cup, strokes until it is enough, and out again.
+
+    Args:
+        session: Which may move the arm.
+        plan: What it will do.
+        wait: Waits for the end of a path; whether no further stroke is wanted.
 
     Raises:
         RigError: The pre-flight list has failures.
         SessionStopped: The arm was stopped.
     """
-    from ..hardware.motion import approach
+    from ..hardware.motion import approach, retract
 
-    ordered = []
-    view.motions = 1 + len(plan.paths)
-    for path in (approach(session.rig, session.pose()), *plan.paths):
+    ordered, enough = list[int](), False
+
+    def follow(path: "PosePath") -> None:
+        nonlocal enough
         ordered.append(session.follow(path))
         # all at once would be checked at once, which takes the cameras' time
         if len(ordered) > PATHS_AHEAD:
-            view.until_done(session, ordered[-1 - PATHS_AHEAD])
-    view.until_done(session, ordered[-1])
+            enough = wait(ordered[-1 - PATHS_AHEAD])
+
+    follow(approach(session.rig, session.pose()))
+    follow(plan.insert)
+    for at, stroke in enumerate(plan.strokes):
+        follow(stroke)
+        if enough and at + 1 < len(plan.strokes):
+            follow(_still(session.rig, stroke.pose[-1]))
+            follow(retract(session.rig, stroke.pose[-1, :3]))
+            break
+    else:
+        follow(plan.retract)
+    for number in ordered[-PATHS_AHEAD:]:
+        wait(number)
+
+
+def _still(rig: "Rig", pose: np.ndarray) -> "PosePath":
+    """The rest at the end of a stir that ends early, as the plan's last stroke has it."""
+    from ..hardware.motion import PosePath
+
+    times = np.arange(0.0, rig.stirring.rest, 1.0 / rig.robot.rate)
+    return PosePath(times, np.tile(pose, (len(times), 1)), stirring=True)

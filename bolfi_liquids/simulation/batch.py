@@ -33,15 +33,6 @@ class Batch(NamedTuple):
         """The liquid, where it is the only one."""
         return self.liquids[0]
 
-    @property
-    def leading(self) -> tuple[str, ...]:
-        """Dimensions of the results before those of one simulation."""
-        return () if self.single else ("simulation",)
-
-    def shaped(self, values: NDArray) -> NDArray:
-        """Values of all simulations, without that axis where there is one simulation."""
-        return values[0] if self.single else values
-
 
 def batch_of(
     liquid: Mapping[str, ArrayLike],
@@ -140,16 +131,13 @@ def theta_of(described: Described) -> dict[str, float]:
     return liquid | dict(described.effects)
 
 
-def simulated(
-    simulator: FluidSimulator, batch: Batch, compute: "Compute", needed: slice = slice(None)
-) -> NDArray[np.float64]:
+def simulated(simulator: FluidSimulator, batch: Batch, compute: "Compute") -> NDArray[np.float64]:
     """Signals of all liquids, shape (simulations, ...).
 
     Args:
-        simulator: Of stirs or pours.
+        simulator: Of stirs or pours; the first number of a signal is finite unless it failed.
         batch: The liquids; their density is the simulator's.
         compute: Where simulations run.
-        needed: Part of a signal that is finite in all simulations that succeed.
 
     Raises:
         RuntimeError: A simulation failed.
@@ -157,10 +145,11 @@ def simulated(
     from ..inference.simulations import Job, run_missing
 
     jobs = [Job(theta_of(one), one.seed) for one in batch.liquids]
-    made = run_missing(Raising(simulator).batched, jobs, compute)
+    made, signals = run_missing(Raising(simulator).batched, jobs, compute), []
     for job, one in zip(jobs, made, strict=True):
         if one.signal is None:
             raise RuntimeError(f"the simulation of {job.theta} failed: {one.error}")
-        if not np.isfinite(one.signal[needed]).all():
+        if not np.isfinite(one.signal.flat[0]):
             raise RuntimeError(f"the simulation of {job.theta} failed: its result is not finite")
-    return np.stack([one.signal for one in made if one.signal is not None])
+        signals.append(one.signal)
+    return np.stack(signals)

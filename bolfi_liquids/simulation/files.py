@@ -1,6 +1,7 @@
-"""What a single simulation leaves: files that are checked before it, and written after it."""
+"""What simulations leave: files that are checked before, data sets, and movies."""
 
 import json
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -9,11 +10,14 @@ from numpy.typing import NDArray
 
 from ..errors import Argument, InputError
 from ..files import given_path, new_file
+from ..inputs.described_liquid import Described
 from ..inputs.fields import PLANES
 from ..inputs.recording import Recording, along_path, recording_dataset
-from ..movie.file import check_movie
+from ..movie.file import PICTURE_RATE, check_movie, write_movie
 from ..pouring.spillage import FRACTIONS
-from .batch import Batch
+from ..progress import progress_bar
+from ..simulators import RATE, PourSimulator, StirSimulator
+from .batch import Batch, theta_of
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -76,7 +80,7 @@ def stir_dataset(batch: Batch, recording: Recording, angles: NDArray) -> "Datase
     if batch.single:
         return found
     planes = {
-        name: ((*batch.leading, "time"), angles[..., plane], found[name].attrs)
+        name: (("simulation", "time"), angles[..., plane], found[name].attrs)
         for plane, name in enumerate(PLANES)
     }
     return found.assign(planes).assign_coords(_coordinates(batch))
@@ -90,12 +94,11 @@ def pour_dataset(
 
     result = landings.into(action.distance, cups.receiver.radius)
     fractions = {
-        name: (batch.leading, batch.shaped(np.asarray(getattr(result, name))), {"units": "1"})
+        name: ("simulation", np.asarray(getattr(result, name)), {"units": "1"})
         for name in FRACTIONS
     }
-    dims = (*batch.leading, "particle", "axis")
-    landing = (dims, batch.shaped(landings.position), {"units": "m"})
-    return Dataset(
+    landing = (("simulation", "particle", "axis"), landings.position, {"units": "m"})
+    found = Dataset(
         {**fractions, "landing": landing},
         coords={"axis": ["ahead", "across"], **_coordinates(batch)},
         attrs={
@@ -105,6 +108,7 @@ def pour_dataset(
             "cups": json.dumps(cups.settings(batch.one.particles)),
         },
     )
+    return found.isel(simulation=0, drop=True) if batch.single else found
 
 
 def _attributes(batch: Batch) -> dict[str, float | int | str]:
@@ -113,11 +117,49 @@ def _attributes(batch: Batch) -> dict[str, float | int | str]:
     return {name: v for name, v in batch.one.attributes().items() if name not in varied}
 
 
-def _coordinates(batch: Batch) -> dict[str, tuple[tuple[str, ...], list[float]]]:
-    """What tells the simulations apart; none where there is one."""
-    if batch.single:
-        return {}
+def _coordinates(batch: Batch) -> dict[str, tuple[str, list[float]]]:
+    """What tells the simulations apart."""
     return {
-        name: (batch.leading, [getattr(liquid, name) for liquid in batch.liquids])
-        for name in VARIED
+        name: ("simulation", [getattr(liquid, name) for liquid in batch.liquids]) for name in VARIED
     }
+
+
+def film_stir(movie: Path, described: Described, simulator: StirSimulator, progress: bool) -> None:
+    """Simulate a stir of one recording again, and write what it looks like."""
+    from ..movie.stir import stir_pictures
+
+    (recording,), (setup,) = simulator.recordings, simulator.setups
+    frames = simulator.frames(theta_of(described), described.seed, PICTURE_RATE)
+    lines = described.lines()
+    caption = [*lines[:2], f"{recording.path.name}, {lines[2]}"]
+    _write(movie, stir_pictures(frames, setup, caption), len(frames.time), progress)
+
+
+def film_pour(
+    movie: Path,
+    described: Described,
+    simulator: PourSimulator,
+    action: "PourAction",
+    progress: bool,
+) -> None:
+    """Simulate a pour again, and write what it looks like."""
+    from ..movie.pour import pour_pictures
+
+    rate, distance = (float(np.asarray(x)) for x in (action.angular_velocity, action.distance))
+    theta = {**theta_of(described), RATE: rate}
+    frames = simulator.frames(theta, described.seed, PICTURE_RATE)
+    turn = f"{np.degrees(rate):g}°/s, lip to axis {100 * distance:g} cm"
+    caption = [*described.lines(), turn]
+    pictures = pour_pictures(frames, simulator.cups, distance, caption)
+    _write(movie, pictures, len(frames.time), progress)
+
+
+def _write(path: Path, pictures: Iterable[NDArray], count: int, progress: bool) -> None:
+    with progress_bar("drawing", count, shown=progress) as advance:
+
+        def counted() -> Iterator[NDArray]:
+            for picture in pictures:
+                yield picture
+                advance(1)
+
+        write_movie(path, counted())

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,26 +26,17 @@ from ..inputs.recording import Recording, Trajectory
 from ..run.compute import open_compute
 from ..simulators import RATE, BatchOf, PourSimulator, StirSimulator
 from .batch import batch_of, simulated
-from .files import check_targets, pour_dataset, stir_dataset
-from .movies import film_pour, film_stir
+from .files import check_targets, film_pour, film_stir, pour_dataset, stir_dataset
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
     from ..inference.simulations import Workers
     from ..models import Cups
+    from ..models.trajectory import PivotPath
 
 RIG_SIZES = (*LENGTHS, *STICK_WEIGHT)  # attributes of a recording that may be replaced
 PATTERN_SPEED = 0.1  # m/s, of a star or circle that is given by its name
-
-
-class TimedPath(Protocol):
-    """Times [s], shape (T,), and positions of the gripper [m], shape (T, 3)."""
-
-    @property
-    def time(self) -> NDArray[np.float64]: ...
-    @property
-    def position(self) -> NDArray[np.float64]: ...
 
 
 def simulate_stir(  # noqa: PLR0913  the one call that most users make
@@ -54,7 +45,7 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     *,
     density: float | None = None,
     effects: Mapping[str, float] | None = None,
-    path: str | TimedPath | None = None,
+    path: "str | PivotPath | None" = None,
     rig: Mapping[str, float] | None = None,
     recording: Source | None = None,
     particles: int = 0,
@@ -150,7 +141,7 @@ def _with_rig(
     return {name: value for name, value in attrs.items() if name not in replaced} | dict(rig)
 
 
-def _planned(recording: Recording, path: str | TimedPath | None) -> Recording:
+def _planned(recording: Recording, path: "str | PivotPath | None") -> Recording:
     """The recording with another path."""
     from ..hardware.motion import circle, star
 
@@ -255,9 +246,8 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     targets.check_single(batch.single)
     outcome, particles = LandedParticles(angular_velocity), batch.one.particles
     simulator = PourSimulator(cups, density, outcome, particles=particles)
-    retained = slice(0, 1)  # what has not landed is NaN
     with open_compute(executor, timeout) as compute:
-        signals = simulated(simulator, batch, compute, retained)
+        signals = simulated(simulator, batch, compute)
     position = signals[:, 1:].reshape(len(signals), -1, 2).astype(np.float32)
     landings = Landings(position, signals[:, 0])
     action = PourAction(angular_velocity, distance)

@@ -14,8 +14,13 @@ from bolfi_liquids.inference.simulations import Compute
 
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.summary import ParameterSummary
-from bolfi_liquids.criticism.source_summary import DifferingWindow, GapSummary, SourceVerdict
-from bolfi_liquids.criticism.summary import CameraNoise, CriticismSummary
+from bolfi_liquids.criticism.summary import (
+    CameraNoise,
+    CriticismSummary,
+    DifferingWindow,
+    GapSummary,
+    SourceVerdict,
+)
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.reporting.films import films_of
 from bolfi_liquids.run.run import Run, as_json
@@ -237,7 +242,10 @@ def made_from():
     return MADE_FROM
 
 
-def _made(*, after=True, held=None, pours=False, status=("named", "rejected", "rejected")):
+STATUS = ("named", "rejected: the data still differ", "rejected: explains nothing")
+
+
+def _made(*, after=True, held=None, pours=False, status=STATUS):
     """A tree as `criticise` writes it: two recordings of 2 s, and maybe four pours."""
     rng = np.random.default_rng(0)
     frames, each = ("frame", "plane"), 20

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from bolfi_liquids.models import faults, runtime
-from bolfi_liquids.models.pouring import PourBatch, watched_landings
+from bolfi_liquids.models.pouring import PourBatch, landings
 from bolfi_liquids.models.pours.vessel import RIM
 from bolfi_liquids.models.runtime import Watch
-from bolfi_liquids.models.stirring import watched_stir
+from bolfi_liquids.models.stirring import stir
 from jax import random
 
 from bolfi_liquids import models
@@ -105,7 +105,7 @@ def stir_faults(drawn, violent):
 
     watch = Watch(1.0 / (LOOK * setup.step(path)), look)
     signal, reasons = told(
-        lambda: watched_stir(drawn.liquid, path, setup, drawn.seeds, drawn.effects, watch)
+        lambda: stir(drawn.liquid, path, setup, drawn.seeds, drawn.effects, watch)
     )
     for k, angles in enumerate(signal):
         if not np.isfinite(angles).all():
@@ -138,7 +138,7 @@ def pour_faults(drawn, cups):
     batch = PourBatch(
         drawn.liquid, drawn.action.angular_velocity, cups, drawn.seeds, FEW, drawn.effects
     )
-    landed, reasons = told(lambda: watched_landings(batch, Watch(20.0, look)))
+    landed, reasons = told(lambda: landings(*batch, Watch(20.0, look)))
     result = landed.into(drawn.action.distance, cups.receiver.radius)
     for k, shares in enumerate(
         np.stack([result.spilled, result.received, result.retained], axis=-1)

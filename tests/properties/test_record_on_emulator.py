@@ -3,6 +3,7 @@
 The recording is the one that the guide makes, by its own words.
 """
 
+import json
 import re
 import subprocess
 import sys
@@ -136,23 +137,24 @@ def test_a_disk_without_room_ends_the_recording_and_is_named_with_its_file(tmp_p
 # `test_online` has the same with a recording that is there, this module the recording
 @pytest.mark.minutes
 def test_stirring_ends_when_the_pour_is_known_well_enough(tmp_path):
-    from bolfi_liquids.online.online import OnlineChoice, OnlineSettings
+    from bolfi_liquids.online.online import LOG, OnlineChoice, OnlineSettings
     from bolfi_liquids.online.record import record_online
 
     # a coarse map, and a target that any estimate meets once enough strokes were made
     settings = OnlineSettings(target=0.9, design=8, budget=12, pours=64, particles=300)
-    told = []
     recording = record_online(
         hardware.bundled_rig(),
         out=tmp_path / "stir",
         emulate=hardware.HiddenLiquid(viscosity=1.0),
-        online=OnlineChoice(tmp_path / "run", settings=settings, cycles=2, told=told.append),
+        online=OnlineChoice(tmp_path / "run", settings=settings, cycles=2),
         progress=False,
     )
     assert recording.attrs["status"] == "complete"
-    strokes = [estimate.strokes for estimate in told]
+    log = (tmp_path / "run" / LOG).read_text().splitlines()
+    told = [json.loads(line) for line in log]
+    strokes = [estimate["strokes"] for estimate in told]
     assert strokes == sorted(strokes) and strokes[-1] >= settings.least_strokes
     assert recording.time[-1] < 17.0 + 1.0  # two cycles last 17 s; it ended early, with its rest
-    assert all(0.0 < estimate.lag < 10.0 for estimate in told)
+    assert all(0.0 < estimate["lag"] < 10.0 for estimate in told)
     posterior = bl.Calibration.open(tmp_path / "run").posterior
     assert np.isfinite(posterior["viscosity"].to_numpy()).all()

@@ -3,23 +3,23 @@
     python tests/benchmarks/hardware/online_lag.py --out DIRECTORY
 
 Each viscosity is stirred, recorded and calibrated as the command does it, with the usual settings.
-The pours of the map are made in the first session only, as for a person who keeps the bank; with a
-bank in DIRECTORY already they are not made at all. Estimates are printed as they come, then a line
-for each viscosity.
+The pours of the map are made in the first session only: the others begin with its bank. A line is
+printed for each viscosity.
 """
 
 import argparse
+import json
 import shutil
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from bolfi_liquids.hardware import HiddenLiquid, SessionStopped, bundled_rig
 from bolfi_liquids.hardware.recorder.events import read_events
 
-from bolfi_liquids.online.estimate import OnlineEstimate
-from bolfi_liquids.online.online import LOG, USUAL_CYCLES, OnlineChoice
-from bolfi_liquids.online.record import record_online, sentence
+from bolfi_liquids.online.online import BANK, LOG, USUAL_CYCLES, OnlineChoice
+from bolfi_liquids.online.record import record_online
 
 VISCOSITIES = (1.0, 0.1, 0.01)  # Pa s
 TRIES = 4  # sessions, of which the computer may be too busy for some
@@ -28,40 +28,39 @@ MOST_PREPARATION, MOST_LAG = 600.0, 10.0  # s, the bars at 1 Pa s
 
 def stirred(
     out: Path, viscosity: float, bank: Path, cycles: int
-) -> tuple[float, list[OnlineEstimate]]:
-    """Seconds until the session began, and what was estimated.
+) -> tuple[float, list[dict[str, Any]]]:
+    """Seconds until the session began, and the lines of `online.jsonl`.
 
     Raises:
         SessionStopped: The arm was stopped.
     """
-    told: list[OnlineEstimate] = []
-
-    def tell(estimate: OnlineEstimate) -> None:
-        told.append(estimate)
-        print(f"  {sentence(estimate)}", flush=True)
-
-    choice = OnlineChoice(out / "run", bank=bank, cycles=cycles, told=tell)
+    run = out / "run"
+    run.mkdir(parents=True)
+    if bank.exists():
+        shutil.copy(bank, run / BANK)
     began = time.monotonic()
     record_online(
         bundled_rig(),
         out=out / "recording",
-        online=choice,
+        online=OnlineChoice(run, cycles=cycles),
         emulate=HiddenLiquid(viscosity=viscosity),
         progress=False,
     )
+    shutil.copy(run / BANK, bank)
     session = next(event for event in read_events(out / "recording") if event["kind"] == "session")
+    told = [json.loads(one) for one in (run / LOG).read_text().splitlines()]
     return float(session["host"]) - began, told
 
 
-def line(viscosity: float, preparation: float, told: list[OnlineEstimate]) -> str:
+def line(viscosity: float, preparation: float, told: list[dict[str, Any]]) -> str:
     """What one session took, in a line."""
-    lags = np.array([estimate.lag for estimate in told])
-    last = told[-1].parameters["viscosity"]
+    lags = np.array([estimate["lag"] for estimate in told])
+    last = told[-1]["parameters"]["viscosity"]
     return (
         f"{viscosity:g} Pa s: prepared in {preparation:.0f} s; {len(told)} estimates after "
-        f"{[estimate.strokes for estimate in told]} strokes, late by {np.median(lags):.1f} s "
+        f"{[estimate['strokes'] for estimate in told]} strokes, late by {np.median(lags):.1f} s "
         f"(median), {lags.max():.1f} s (most); "
-        f"viscosity at the end {last.q50:.3g} ({last.q05:.2g} to {last.q95:.2g})"
+        f"viscosity at the end {last['q50']:.3g} ({last['q05']:.2g} to {last['q95']:.2g})"
     )
 
 
@@ -88,8 +87,8 @@ def main() -> int:
             print(lines[-1], flush=True)
             if viscosity == 1.0 and preparation > MOST_PREPARATION:
                 wrong.append(f"preparation took {preparation:.0f} s")
-            if viscosity == 1.0 and max(one.lag for one in told) > MOST_LAG:
-                wrong.append(f"an estimate came {max(one.lag for one in told):.1f} s late")
+            if viscosity == 1.0 and max(one["lag"] for one in told) > MOST_LAG:
+                wrong.append(f"an estimate came {max(one['lag'] for one in told):.1f} s late")
             break
         else:
             wrong.append(f"{viscosity:g} Pa s: none of {TRIES} sessions was carried out")

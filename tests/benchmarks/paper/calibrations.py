@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from bolfi_liquids.inference import Bolfi, Fit, Prior, SimulationBank, engine_version
+from bolfi_liquids.inference.criticism import KnownNoise
 from bolfi_liquids.inference.simulations import Compute
 from bolfi_liquids.inference.types import Simulator
 from bolfi_liquids.models import Cups
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from bolfi_liquids import models
 from bolfi_liquids.calibration.engine_fit import engine_options
 from bolfi_liquids.calibration.result import pick_draws
-from bolfi_liquids.checks.sbc_pipelines import SAMPLING, SampleNoise
+from bolfi_liquids.checks.sbc_pipelines import SAMPLING, Observed
 from bolfi_liquids.inputs.prior import describe_prior
 from bolfi_liquids.inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from bolfi_liquids.seeds import generator
@@ -32,7 +33,8 @@ from .truths import DENSITY
 
 DRAWS_EACH = 16  # of each posterior
 BATCH = 4  # simulations at the same time
-CAMERA_NOISE = SampleNoise(np.radians(0.1))
+CAMERA_NOISE_SD = float(np.radians(0.1))
+CAMERA_NOISE = Observed(KnownNoise(CAMERA_NOISE_SD))
 PARAMETER_NAMES = ("viscosity", "cohesion")
 
 
@@ -145,7 +147,7 @@ def _made_by(prior: Prior) -> list[Any]:
     """What the conclusions of all learners depend on."""
     learned_by = [engine_version.ENGINE_VERSION, describe_prior(prior), BATCH]
     learned_by += [PAPER_RULES, MIN_SIMULATIONS]
-    return [*learned_by, SAMPLING, DRAWS_EACH, CAMERA_NOISE.sd, DENSITY]
+    return [*learned_by, SAMPLING, DRAWS_EACH, CAMERA_NOISE_SD, DENSITY]
 
 
 def after_each(engine: Bolfi, simulate: Simulator, budgets: Sequence[int]) -> Iterator[Fit]:

@@ -24,7 +24,7 @@ from bolfi_liquids.inputs.open import open_recording
 from bolfi_liquids.inputs.recording import Recording, along_path, recording_dataset
 from bolfi_liquids.seeds import generator, simulation_seeds
 
-from .calibrations import CAMERA_NOISE
+from .calibrations import CAMERA_NOISE, CAMERA_NOISE_SD
 from .phases import Phase
 from .truths import LIQUIDS, LOG_VISCOSITY_SD
 
@@ -87,7 +87,7 @@ def recipe(cups: Cups, particles: int, seed: int) -> str:
         ADHESION_RANGE,
         COHESION_RANGE,
         TRAINING,
-        CAMERA_NOISE.sd,
+        CAMERA_NOISE_SD,
     ]
     text = json.dumps([*made_by, cups.settings(), particles, seed], sort_keys=True)
     return sha256(text.encode()).hexdigest()[:8]

@@ -11,12 +11,13 @@ import numpyro.distributions as dist
 import pytest
 import xarray as xr
 from bolfi_liquids.inference.acquisition import rules
+from bolfi_liquids.inference.criticism import KnownNoise
 
 from bolfi_liquids import inference
 from bolfi_liquids.checks.sbc import check_sbc
 from bolfi_liquids.checks.sbc_pipelines import (
     FromBank,
-    SampleNoise,
+    Observed,
     _nearest,
 )
 from bolfi_liquids.inputs.settings import RUNS_PER_POINT, CalibrationSettings, SbcSettings
@@ -74,7 +75,7 @@ def test_every_batch_is_asked_with_random_numbers_of_its_own(monkeypatch):
 
 def test_camera_noise_is_as_large_as_it_says():
     rng = np.random.default_rng(0)
-    noise = SampleNoise(0.3)(np.zeros((400, 2)), rng)
+    noise = Observed(KnownNoise(0.3))(np.zeros((400, 2)), rng)
     # the standard error of a standard deviation is sd / sqrt(2 n)
     assert noise.std() == pytest.approx(0.3, abs=4 * 0.3 / np.sqrt(2 * noise.size))
 

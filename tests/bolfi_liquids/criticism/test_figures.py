@@ -7,8 +7,13 @@ import numpy as np
 import pytest
 
 import bolfi_liquids as bl
-from bolfi_liquids.criticism.effect_figures import coefficient_plot, confusion_plot, score_plot
-from bolfi_liquids.criticism.figures import residual_plot, stroke_plot
+from bolfi_liquids.criticism.figures import (
+    coefficient_plot,
+    confusion_plot,
+    residual_plot,
+    score_plot,
+    stroke_plot,
+)
 from bolfi_liquids.drawing import new_figure, to_svg
 
 

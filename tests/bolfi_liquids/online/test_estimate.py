@@ -67,9 +67,8 @@ def signals(theta, seeds, times=PLAN.time):
     return size[:, None, None] * wave + noise
 
 
-def problem(surrogate="discrepancy", **settings):
-    stirring = stir_simulator([PLAN], 200)
-    return Problem(default_prior(), stirring, OnlineSettings(surrogate=surrogate, **settings))
+def problem(**settings):
+    return Problem(default_prior(), stir_simulator([PLAN], 200), OnlineSettings(**settings))
 
 
 def made(of, times=PLAN.time):
@@ -93,11 +92,8 @@ def width(found):
     return np.log(spread.q95 / spread.q05)
 
 
-@pytest.mark.parametrize(
-    "surrogate", ["discrepancy", pytest.param("signal", marks=pytest.mark.slow)]
-)
-def test_more_strokes_say_more(surrogate):
-    of = problem(surrogate)
+def test_more_strokes_say_more():
+    of = problem()
     known = made(of)
     first, last = (
         [estimate(of, known, aligned(k, seed), NoMap(), 0.0) for seed in range(6)]
@@ -194,13 +190,11 @@ def test_an_estimate_is_as_late_as_its_stroke_ended_before_it():
 
 
 @pytest.mark.parametrize(
-    ("stop", "target", "strokes", "ends"),
-    [("mean", 0.02, 9, True), ("mean", 0.02, 8, False), ("bound", 0.02, 9, False)]
-    + [("bound", 0.04, 9, True)],
+    ("target", "strokes", "ends"), [(0.02, 9, False), (0.04, 8, False), (0.04, 9, True)]
 )
-def test_it_is_enough_when_what_was_asked_for_is_under_the_target(stop, target, strokes, ends):
+def test_it_is_enough_when_one_pour_in_twenty_spills_more_than_the_target(target, strokes, ends):
     found = OnlineEstimate(strokes, 1.0, {}, {}, 0.01, 0.03, 16, 0.1, 0.0, 0.0, ())
-    assert found.is_enough(OnlineSettings(stop=stop, target=target)) is ends
+    assert found.is_enough(OnlineSettings(target=target)) is ends
 
 
 def test_an_estimate_that_fits_nothing_says_so_and_ends_nothing():
@@ -250,9 +244,7 @@ def test_an_online_estimate_names_a_wrong_frame():
         assert not (faults and found.fits)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"), [("target", 0.0), ("stop", "never"), ("budget", 3), ("surrogate", "none")]
-)
+@pytest.mark.parametrize(("name", "value"), [("target", 0.0), ("budget", 3)])
 def test_bad_setting_is_named(name, value):
     with pytest.raises(ValueError, match=f"online setting {name}: {value!r}"):
         OnlineSettings(**{name: value})

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from bolfi_liquids.criticism.pour_noise import ACTION_STEP, REPEATABILITY_SD
+from bolfi_liquids.criticism.pour_noise import ACTION_STEP, REPEATABILITY_SD, action_coordinates
 from bolfi_liquids.pouring.residual import (
     Residual,
     angle,
-    coordinates,
     expected_share,
     learn_residual,
     share,
@@ -96,7 +95,7 @@ def test_the_mean_of_a_share(rng, mean, sd):
 
 
 def test_actions_are_alike_by_ratio_of_speed_and_difference_of_distance():
-    x = coordinates(np.array([1.0, 2.0, 4.0]), np.array([0.0, 0.007, 0.014]))
+    x = action_coordinates(np.array([1.0, 2.0, 4.0]), np.array([0.0, 0.007, 0.014]))
     steps = np.diff(x, axis=0)
     np.testing.assert_allclose(steps[:, 0], np.log(2.0) / ACTION_STEP[0])
     np.testing.assert_allclose(steps[:, 1], 1.0)

@@ -10,8 +10,7 @@ import bolfi_liquids as bl
 from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.cli.printed import print_findings
 from bolfi_liquids.criticism.criticism_file import EffectStatus
-from bolfi_liquids.criticism.source_summary import PourVerdict, SourceVerdict
-from bolfi_liquids.criticism.summary import SuggestedExperiment
+from bolfi_liquids.criticism.summary import PourVerdict, SourceVerdict, SuggestedExperiment
 from bolfi_liquids.reporting.facts import DETECTABLE_SNR, criticism_facts
 from bolfi_liquids.reporting.prose import prose
 from bolfi_liquids.reporting.report import figures_of
@@ -117,7 +116,7 @@ def test_next_experiment_that_would_not_help_is_not_recommended(said):
 
 
 def test_an_explanation_that_held_out_data_refute_does_not_hold(criticise, made):
-    status = [EffectStatus.REFUTED, EffectStatus.REJECTED, EffectStatus.REJECTED]
+    status = [EffectStatus.REFUTED, EffectStatus.STILL_DIFFERS, EffectStatus.GAINS_NOTHING]
     tree = made(after=False, held=False, status=status)
     facts = criticism_facts(criticise(tree, **REFUTED))
     assert facts["holds"] == {"camera delay": False}
@@ -220,7 +219,7 @@ def test_the_command_line_says_what_the_report_says(printed, said):
 
 @pytest.mark.parametrize(("changes", "told"), [(TIED, True), (REFUTED, True), ({}, False)])
 def test_effects_that_gain_are_named_where_nothing_else_is(said, made, changes, told):
-    *_, last = said("detectable", made(status=["rejected"] * 3), **changes)
+    *_, last = said("detectable", made(status=["rejected: explains nothing"] * 3), **changes)
     assert ("camera delay (gain 286.0" in last and "stick mass (gain 4.0" in last) == told
     assert "gripper scale (gain" not in last
     unfitted = made(status=["not needed"] * 3)

@@ -11,7 +11,7 @@ from bolfi_liquids.inference.criticism.verdict_kind import VerdictKind
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.figures import _rms_by
 from bolfi_liquids.calibration.summary import FitStatus, bad_fit
-from bolfi_liquids.criticism.source_summary import PourVerdict
+from bolfi_liquids.criticism.summary import PourVerdict
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring.draining import Hold
 from bolfi_liquids.pouring.figures import not_surely_worse

@@ -47,9 +47,10 @@ def refused(*_):
 
 def test_the_action_is_that_of_pour_nc_to_the_last_digit(poured_run):
     chosen = bl.Pour.open(poured_run).chosen
-    plan = plan_pour(Run.open(poured_run), bundled_rig())
-    assert plan.chosen.judged.action == chosen.action
-    turned = plan.path.pose[:, 3:]
+    planned = chosen_in(poured_run)
+    assert planned.judged.action == chosen.action
+    (path,) = plan_pour(planned, bundled_rig()).paths
+    turned = path.pose[:, 3:]
     assert np.ptp(turned, axis=0).max() > 1.0  # it does pour
 
 
@@ -64,9 +65,9 @@ def test_a_receiver_that_overlaps_the_stirred_cup_is_refused_with_its_own_radius
         return rig.model_copy(update={"pouring": rig.pouring.model_copy(update=place)})
 
     with pytest.raises(InputError, match="stands in the stirred cup"):
-        plan_pour(Run.open(poured_run), beside(-0.001))
+        plan_pour(chosen_in(poured_run), beside(-0.001))
     with suppress(MotionRejected):  # so near, a pour leaves its box
-        plan_pour(Run.open(poured_run), beside(0.001))
+        plan_pour(chosen_in(poured_run), beside(0.001))
 
 
 @pytest.mark.parametrize(
