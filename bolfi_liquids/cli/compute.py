@@ -38,6 +38,11 @@ class ComputeOptions:
         None
     )
 
+    def __post_init__(self) -> None:
+        from ..run.compute import check_timeout
+
+        check_timeout(self.timeout)
+
     @contextmanager
     def opened(self) -> "Iterator[Compute]":
         """With the executor that `workers` and `dask` name; it is closed afterwards.

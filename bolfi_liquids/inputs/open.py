@@ -83,15 +83,15 @@ def read_fields(content: bytes, path: Path) -> "Dataset":
     Raises:
         InputError: The file is damaged, or lacks a field.
     """
-    import h5py
-    import xarray
-
     if not content.startswith((HDF5, CLASSIC_NETCDF)):
         raise InputError(
             "not a NetCDF file that can be read",
             where=str(path),
             fix="if it is a table, bolfi-liquids import makes a recording of it",
         )
+    import h5py
+    import xarray
+
     try:
         if content.startswith(HDF5):  # where its root is damaged, h5netcdf complains twice
             with h5py.File(io.BytesIO(content), "r") as file:

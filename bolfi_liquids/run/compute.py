@@ -24,7 +24,16 @@ def open_compute(workers: "Workers | None", timeout: float | None = None) -> "It
         ValueError: `workers` is something else, or has several threads in a process.
         ImportError, ConnectionError: Dask is not installed, or no scheduler answers.
     """
-    from ..inference import arguments, simulations
+    from ..inference import simulations
+
+    check_timeout(timeout)
+    with simulations.open_compute(workers, timeout, one_thread=True) as compute:
+        yield compute
+
+
+def check_timeout(timeout: float | None) -> None:
+    """Raise `InputError` unless it is a positive number of seconds, or None."""
+    from ..inference import arguments
 
     try:
         arguments.check_timeout(timeout)
@@ -34,5 +43,3 @@ def open_compute(workers: "Workers | None", timeout: float | None = None) -> "It
             where=Argument("timeout"),
             fix="give a positive number of seconds, or none",
         ) from refused
-    with simulations.open_compute(workers, timeout, one_thread=True) as compute:
-        yield compute
