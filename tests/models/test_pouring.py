@@ -2,6 +2,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from bolfi_liquids.models.pouring import _checked_rate
 
 from bolfi_liquids import models
 
@@ -81,7 +82,7 @@ def test_every_angular_velocity_of_a_cups_file_is_one_that_pours_take(tmp_path):
     path = tmp_path / "cups.toml"
     path.write_text(bundled_text().replace("[30.0, 180.0]", "[0.573, 1718.8]", 1))
     for rate in models.Cups.from_toml(path).angular_velocity_range:
-        assert models.pouring._checked_rate(rate, 1) == rate
+        assert _checked_rate(rate, 1) == rate
 
 
 def bundled_text():
