@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from .liquid import Liquid
 from .number_checks import check_numbers, checked_seeds
-from .pouring import Landings, PourBatch, landings
+from .pouring import Landings, PourBatch, watched_landings
 from .pours.vessel import turned
 from .runtime import Watch
 from .stir_setup import StirSetup
@@ -125,7 +125,7 @@ def pour_frames(batch: PourBatch, *, rate: float = FRAME_RATE) -> PourFrames:
         whole[: len(half), 0], whole[: len(half), 1] = half, half * [1.0, -1.0, 1.0]
         seen.append((time, whole.reshape(-1, 3), angle))
 
-    landed = landings(*batch, Watch(rate, look))
+    landed = watched_landings(batch, Watch(rate, look))
     time, position, angle = map(np.stack, zip(*seen, strict=True))
     if np.isnan(landed.retained).any():
         position[:] = np.nan

@@ -122,24 +122,20 @@ def pour(
     return landed.into(distance, cups.receiver.radius)
 
 
-def landings(  # noqa: PLR0913  the fields of `PourBatch`, and what looks on
+def landings(
     liquid: Liquid,
     angular_velocity: ArrayLike,
     cups: Cups,
     seeds: ArrayLike,
     particles: int = 0,
     effects: Mapping[str, ArrayLike] | None = None,
-    watch: Watch | None = None,
 ) -> Landings:
     """Points at which the liquid lands, for receivers at any distance; arguments as for `pour`.
 
     `Landings.into` makes of them what `pour` would have returned, the receiver's distance and
-    radius in `cups` aside. `watch` looks on at each scene.
+    radius in `cups` aside.
     """
-    batch = PourBatch(liquid, angular_velocity, cups, seeds, particles, effects)
-    found, drop = _flights(batch, watch), cups.pour.lip_height - cups.receiver.height
-    position = np.stack([landing_of(flights, drop) for flights in found])
-    return Landings(position, np.array([flights.retained for flights in found]))
+    return watched_landings(PourBatch(liquid, angular_velocity, cups, seeds, particles, effects))
 
 
 class PourBatch(NamedTuple):
@@ -151,6 +147,14 @@ class PourBatch(NamedTuple):
     seeds: ArrayLike
     particles: int = 0
     effects: Mapping[str, ArrayLike] | None = None
+
+
+def watched_landings(batch: PourBatch, watch: Watch | None = None) -> Landings:
+    """What `landings` returns, while `watch` looks at each of its scenes."""
+    found, cups = _flights(batch, watch), batch.cups
+    drop = cups.pour.lip_height - cups.receiver.height
+    position = np.stack([landing_of(flights, drop) for flights in found])
+    return Landings(position, np.array([flights.retained for flights in found]))
 
 
 def draining(batch: PourBatch, held: ArrayLike) -> np.ndarray:

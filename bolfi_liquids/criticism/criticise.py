@@ -90,7 +90,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     clean = open_recordings(baseline, Argument("baseline"))
     with Run.entered(calibration) as run:
         base = Calibration.of(run)
-        inputs = open_inputs(base, settings, kept_back, clean, pours, held_out_pours, cups)
+        poured = pours, held_out_pours
+        inputs = open_inputs(base, settings, kept_back, clean, poured, cups)
         for notice in recording_warnings(inputs.compared):
             logger.warning(notice)
         for name in inputs.left_out:

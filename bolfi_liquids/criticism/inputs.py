@@ -93,16 +93,20 @@ class Inputs:
         return json.loads(json.dumps(made_from))  # as it will be read
 
 
-def open_inputs(  # noqa: PLR0913  what `criticise` is given
+def open_inputs(
     calibration: Calibration,
     settings: CriticismSettings,
     held_out: list[Recording],
     baseline: list[Recording],
-    pours: Pours | None = None,
-    held_out_pours: Pours | None = None,
+    poured: tuple[Pours | None, Pours | None] = (None, None),
     cups: "Cups | str | Path | None" = None,
 ) -> Inputs:
     """Read what is given as a path, and check all of it.
+
+    Args:
+        calibration: What is criticised.
+        settings, held_out, baseline, cups: See `criticise`.
+        poured: Its `pours` and `held_out_pours`.
 
     Raises:
         InputError: Something cannot be used.
@@ -114,8 +118,8 @@ def open_inputs(  # noqa: PLR0913  what `criticise` is given
     clean = {recording.hash: recording for recording in baseline if recording.hash not in used}
     left_out = dict.fromkeys(one.path.name for one in baseline if one.hash in used)
     check_baseline(stirring, tuple(clean.values()))
-    table, cups = table_and_cups(pours, cups)
-    held_out_table = table_of(held_out_pours, Argument("held_out_pours"))
+    table, cups = table_and_cups(poured[0], cups)
+    held_out_table = table_of(poured[1], Argument("held_out_pours"))
     _check_pours(table, held_out_table, settings)
     if held_out_table is not None:
         check_scene(held_out_table, cups)

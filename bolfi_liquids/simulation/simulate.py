@@ -90,6 +90,11 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
 
     targets, effects = check_targets(movie, out), check_effects(effects, "stir")
     weighed = None if density is None else number_of(density, Argument("density"))
+    liquid = {"viscosity": viscosity, "cohesion": cohesion}
+    # refused before a file is read
+    batch_of(
+        {**liquid, "density": DENSITY if weighed is None else weighed}, effects, particles, seed
+    )
     (opened,) = open_recordings(bundled_recording("glycerin") if recording is None else recording)
     if targets.out is not None and targets.out.exists() and targets.out.samefile(opened.path):
         raise InputError(
@@ -97,11 +102,10 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
         )
     if weighed is None:
         weighed = opened.number("liquid_density")
-    liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": weighed}
     of_another = _with_rig(opened.attrs, rig) | {"liquid_density": weighed}
     plan = _planned(replace(opened, attrs=of_another), path)
     count = particles or StirSetup.from_recording(plan).particles
-    batch = batch_of(liquid, effects, count, seed)
+    batch = batch_of({**liquid, "density": weighed}, effects, count, seed)
     targets.check_single(batch.single)
     setup = StirSetup.from_recording(plan, particles=batch.one.particles)
     simulator = StirSimulator((plan,), (setup,))

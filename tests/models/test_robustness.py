@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from bolfi_liquids.models import faults, runtime
-from bolfi_liquids.models.pouring import PourBatch, landings
+from bolfi_liquids.models.pouring import PourBatch, watched_landings
 from bolfi_liquids.models.pours.vessel import RIM
 from bolfi_liquids.models.runtime import Watch
 from bolfi_liquids.models.stirring import stir
@@ -138,7 +138,7 @@ def pour_faults(drawn, cups):
     batch = PourBatch(
         drawn.liquid, drawn.action.angular_velocity, cups, drawn.seeds, FEW, drawn.effects
     )
-    landed, reasons = told(lambda: landings(*batch, Watch(20.0, look)))
+    landed, reasons = told(lambda: watched_landings(batch, Watch(20.0, look)))
     result = landed.into(drawn.action.distance, cups.receiver.radius)
     for k, shares in enumerate(
         np.stack([result.spilled, result.received, result.retained], axis=-1)

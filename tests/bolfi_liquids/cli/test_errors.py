@@ -35,7 +35,7 @@ def test_who_interrupts_is_told_to_resume_only_what_has_begun(tmp_path, monkeypa
 
 TYPED = {
     "calibrate": (["stir.nc", "--out", "r", "--budget", "1"], "--budget: 1;"),
-    "simulate pour": (["--angular-velocity", "0"], "--angular-velocity: 0;"),
+    "simulate pour": (["--angular-velocity", "0"], "--angular-velocity: 0 deg/s;"),
     "check sbc": (["--noise-deg", "-1", "--out", "r"], "--noise-deg: -1.0;"),
     "pour": (["r", "--iterations", "1"], "--iterations: 1;"),
     "record": (["--cycles", "0", "--out", "r"], "--cycles: 0;"),

@@ -28,7 +28,8 @@ def given(calibration, settings=None, **some):
         name: open_recordings(paths, Argument(name)) if name in ("held_out", "baseline") else paths
         for name, paths in unopened.items()
     }
-    return open_inputs(calibration, settings, **opened)
+    poured = opened.pop("pours", None), opened.pop("held_out_pours", None)
+    return open_inputs(calibration, settings, **opened, poured=poured)
 
 
 @pytest.fixture
