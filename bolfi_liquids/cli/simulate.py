@@ -162,9 +162,9 @@ def _tell(made: "Dataset", how: str) -> None:
 
     from ..inputs.described_liquid import Described
 
-    names = ("viscosity", "cohesion", "liquid_density", "effects", "particles", "seed")
-    *numbers, effects, particles, seed = (made.attrs[name] for name in names)
-    liquid = Described(*map(float, numbers), json.loads(effects), int(particles), int(seed))
+    numbers = (float(made.attrs[name]) for name in ("viscosity", "cohesion", "liquid_density"))
+    effects, particles, seed = (made.attrs[name] for name in ("effects", "particles", "seed"))
+    liquid = Described(*numbers, effects=json.loads(effects), particles=particles, seed=seed)
     typer.echo("\n".join([*liquid.lines(), how]))
 
 

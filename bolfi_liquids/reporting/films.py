@@ -111,7 +111,7 @@ class Film(NamedTuple):
 
         rate = {RATE: self.action[RATE]} if self.action else {}
         with nullcontext() if timeout is None else time_limit(timeout):
-            frames = self.simulator.frames(self.theta | rate, self.seed, FILM_RATE)
+            frames: Any = self.simulator.frames(self.theta | rate, self.seed, FILM_RATE)
         if np.isnan(frames.position[0]).all():
             return None
         if isinstance(self.simulator, StirSimulator):
