@@ -162,12 +162,9 @@ def _tell(made: "Dataset", how: str) -> None:
 
     from ..inputs.described_liquid import Described
 
-    of = made.attrs
-    viscosity, cohesion, density = map(
-        float, (of["viscosity"], of["cohesion"], of["liquid_density"])
-    )
-    effects, count, seed = json.loads(of["effects"]), int(of["particles"]), int(of["seed"])
-    liquid = Described(viscosity, cohesion, density, effects, count, seed)
+    numbers = (float(made.attrs[name]) for name in ("viscosity", "cohesion", "liquid_density"))
+    effects, particles, seed = (made.attrs[name] for name in ("effects", "particles", "seed"))
+    liquid = Described(*numbers, effects=json.loads(effects), particles=particles, seed=seed)
     typer.echo("\n".join([*liquid.lines(), how]))
 
 

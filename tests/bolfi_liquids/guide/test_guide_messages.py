@@ -230,7 +230,7 @@ def test_criticism_without_proof_or_with_none(told, run, criticism_summary):
     copy = next((run / "recordings").iterdir())
     shutil.copy(copy, "stir.nc")
     assert told("criticise runs/mine --held-out stir.nc") in QUOTED
-    (no_baseline,) = prose("baseline", {"criticism": {"baseline": 0, "not_clean": ()}})
+    (no_baseline,) = prose("baseline", {"criticism": {"baseline": 0, "baseline_left_out": ()}})
     assert no_baseline in QUOTED
     facts = verdict_facts(replace(criticism_summary, held_out=0))
     (unconfirmed,) = prose("verdict", {"criticism": facts})

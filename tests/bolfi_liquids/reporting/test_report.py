@@ -11,9 +11,11 @@ from multiprocessing import get_context
 import pytest
 import xarray as xr
 from bolfi_liquids.inference.simulations import Compute
+from typer.testing import CliRunner
 
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.summary import ParameterSummary
+from bolfi_liquids.cli.app import app
 from bolfi_liquids.cli.printed import print_pour
 from bolfi_liquids.reporting import films as making
 from bolfi_liquids.reporting.facts import calibration_facts, criticism_facts, fit_facts, pour_facts
@@ -197,6 +199,26 @@ def test_file_names_are_escaped(calibration, tmp_path):
     text, _ = read(bl.report(path, moving=False))
     assert "<script>alert" not in text
     assert "&lt;script&gt;alert" in text
+
+
+def headline(run):
+    return re.search('<p class="headline">.*', bl.report(run, moving=False).read_text("utf-8"))[0]
+
+
+def test_a_forced_pour_is_said_in_the_headline(pour, tmp_path, with_numbers):
+    run = shutil.copytree(pour.path, tmp_path / "run")
+    assert "--force" not in headline(run)
+    with_numbers(run, fit_rms_deg=2.1, noise_deg=0.24)
+    assert "--force" in headline(run)
+
+
+def test_a_result_that_does_not_count_is_warned_of(pour, tmp_path):
+    """The page is whole without it: no error."""
+    run = shutil.copytree(pour.path, tmp_path / "run")
+    (run / "pour.nc").write_bytes(b"damaged")
+    result = CliRunner().invoke(app, ["report", str(run), "--still"])
+    assert (result.exit_code, result.stdout.strip()) == (0, str(run / "report.html"))
+    assert "pour.nc is damaged; make it again: bolfi-liquids pour" in result.stderr
 
 
 @pytest.mark.parametrize(
