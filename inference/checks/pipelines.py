@@ -5,7 +5,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from inspect import signature
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -144,7 +144,7 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
     with ExitStack() as stack:
         compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         advance = stack.enter_context(progress_bar("simulations", n, shown=progress))
-        simulator, asked = cast(Simulator, pipeline.simulate), jobs(theta, seeds)
+        simulator, asked = batched(pipeline.simulate), jobs(theta, seeds)
         made = run_missing(simulator, asked, compute, identity=identity, advance=advance)
     good = sum(result.signal is not None for result in made)
     if good < MIN_LEARN:
