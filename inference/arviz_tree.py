@@ -17,9 +17,9 @@ nothing from one, and the fit's complaints in the attribute `warnings`. simulati
 `fit_status`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import arviz_base
 import numpy as np
@@ -29,12 +29,25 @@ from .history import History
 from .prior import Prior
 from .sampling.convergence import diagnose
 from .sampling.draw import Sampled
-
-if TYPE_CHECKING:
-    from .result import Fit
+from .surrogates.base import Surrogate
 
 PREDICTED_DRAWS = 50  # draws of each chain for which the surrogate predicts
 SAMPLE_DIMS = ("chain", "draw")
+
+
+class Fitted(Protocol):
+    """The part of a `Fit` that its tree shows."""
+
+    @property
+    def prior(self) -> Prior: ...
+    @property
+    def observed(self) -> np.ndarray: ...
+    @property
+    def simulations(self) -> xr.Dataset: ...
+    @property
+    def learned(self) -> Surrogate: ...
+    @property
+    def training_mask(self) -> np.ndarray: ...
 
 
 def simulations_dataset(prior: Prior, history: History) -> xr.Dataset:
@@ -56,12 +69,17 @@ def simulations_dataset(prior: Prior, history: History) -> xr.Dataset:
 
 
 def results_tree(
-    fit: "Fit", made: Sampled, seed: int, attributes: Mapping[str, object]
+    fit: Fitted,
+    warnings: Sequence[str],
+    made: Sampled,
+    seed: int,
+    attributes: Mapping[str, object],
 ) -> xr.DataTree:
-    """What `Fit.sample` returns.
+    """The tree that `Fit.sample` returns.
 
     Args:
-        fit: What was sampled.
+        fit: The fit that was sampled.
+        warnings: Its complaints.
         made: The draws.
         seed: Of the prior's draws, as many as each chain's, and of the predictions.
         attributes: Of the root.
@@ -98,7 +116,7 @@ def results_tree(
     if constants:
         tree["constant_data"] = arviz_base.from_dict({"constant_data": constants})["constant_data"]
     _predict(tree, fit, chains.u, np.random.default_rng([seed, *b"predictive"]))
-    tree["emulator_checks"] = xr.DataTree(_emulator_checks(fit))
+    tree["emulator_checks"] = xr.DataTree(_emulator_checks(fit, warnings))
     for group in tree.children.values():
         sampled = [name for name in SAMPLE_DIMS if name in group.dims]
         group.attrs.pop("sample_dims", None)
@@ -108,7 +126,7 @@ def results_tree(
     return tree
 
 
-def _predict(tree: xr.DataTree, fit: "Fit", u: np.ndarray, rng: np.random.Generator) -> None:
+def _predict(tree: xr.DataTree, fit: Fitted, u: np.ndarray, rng: np.random.Generator) -> None:
     """Add posterior_predictive at evenly spaced ones of the draws u [chain, draw, d]."""
     chains, draws, d = u.shape
     rows = np.linspace(0, draws - 1, min(draws, PREDICTED_DRAWS)).round().astype(int)
@@ -122,7 +140,7 @@ def _predict(tree: xr.DataTree, fit: "Fit", u: np.ndarray, rng: np.random.Genera
         tree["posterior_predictive"] = made["posterior_predictive"]
 
 
-def _emulator_checks(fit: "Fit") -> xr.Dataset:
+def _emulator_checks(fit: Fitted, warnings: Sequence[str]) -> xr.Dataset:
     """The surrogate's checks with a row for each simulation."""
     columns = {}
     for name, values in fit.learned.checks().items():
@@ -130,4 +148,4 @@ def _emulator_checks(fit: "Fit") -> xr.Dataset:
         of_all[fit.training_mask] = values
         axes = (f"{name}_dim_{i}" for i in range(values.ndim - 1))
         columns[name] = (["simulation", *axes], of_all)
-    return xr.Dataset(columns, attrs={"warnings": "\n".join(fit.warnings)})
+    return xr.Dataset(columns, attrs={"warnings": "\n".join(warnings)})

@@ -6,13 +6,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from xarray import DataTree
 
-from .arguments import check_kind
-
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from .history import History
-    from .result import Fit
 
 INK, GREY = "#1f2933", "#8a94a0"
 COLOURS = ("#2463a6", "#d1591a", "#2d8659", "#8a4fa3", "#b8860b", "#5b6770", "#c2185b", "#00838f")
@@ -54,12 +51,12 @@ def plot_search(history: "History", ax: "Axes | None") -> "Axes":
     return bare(ax)
 
 
-def plot_predictive(fit: "Fit", sampled: DataTree | None, axes: Any) -> "list[Axes]":
+def plot_predictive(
+    observed: np.ndarray, closest: np.ndarray, tree: DataTree, axes: Any
+) -> "list[Axes]":
     """See `Fit.plot_predictive`; what has another shape than the data is left out."""
-    check_kind("sampled", sampled, DataTree | None)
-    check_axes(axes)
-    tree = fit.sample(draws=250, warmup=250, warn=False) if sampled is None else sampled
-    observed, closest = fit.observed, fit.closest.signal
+    if not isinstance(tree, DataTree):
+        raise ValueError(f"sampled must be what `sample` returned or None, got {tree!r:.100}")
     panels = _channels(observed)[:MAX_PANELS]
     near = _channels(closest) if closest.shape == observed.shape else None
     groups = tree["posterior_predictive"] if "posterior_predictive" in tree.children else {}

@@ -1,7 +1,7 @@
 """The usual loop: ask, simulate, store, tell."""
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import ExitStack
 from pathlib import Path
@@ -182,7 +182,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         own = {"surrogate": engine.family, "acquisition": acquisition, "initial": engine.initial}
         own |= {"batch": batch, "in_rounds": in_rounds, "confirm": confirm, "timeout": timeout}
         own |= {} if earlier is None else {"earlier": earlier}
-        engine.recipe = Recipe(simulator, identity, budget, own)
+        engine.recipe = Recipe(simulator, identity, budget, own, fit, _check, _criticise)
     if earlier is not None:
         engine.tell(*earlier)
     if budget + engine.told < engine.initial:
@@ -220,6 +220,18 @@ def fit(  # noqa: PLR0913  the one call that most users make
     if warn:
         complain(made.warnings, stacklevel=3)
     return made
+
+
+def _check(made: Fit, n: int, **how: Any) -> Any:
+    from .checks import check_fit
+
+    return check_fit(made, n, **how)
+
+
+def _criticise(made: Fit, extensions: Mapping[str, Any], **how: Any) -> Any:
+    from .criticism import criticise_fit
+
+    return criticise_fit(made, extensions, **how)
 
 
 def fit_losses(

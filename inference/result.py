@@ -2,8 +2,8 @@
 
 import time
 import warnings
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -34,29 +34,32 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from .checks import FitCheck
-    from .criticism import Criticism
-    from .criticism.model_extension import Extensions
 
 LEAST_EFFECTIVE = 32.0  # points of a population that stand for a posterior
 MUCH_DOUBT = 1.5  # see `Fit.doubt`: beyond it more is simulated, and a fit warns
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
 
 
-class Recipe(NamedTuple):
-    """How `fit` made a fit.
+@dataclass(frozen=True)
+class Recipe:
+    """How `fit` made a fit, and what can be done with that.
 
     Attributes:
         simulate: The simulator, of batches.
         identity: Its name in a bank.
         budget: Simulations in all.
         options: Other arguments of `fit` that the result depends on; "surrogate" is a family.
+        fit: `fit` itself: a result knows nothing of the loop that makes it.
+        check, criticise: `checks.check_fit` and `criticism.criticise_fit`, likewise.
     """
 
     simulate: Simulator
     identity: str
     budget: int
     options: Mapping[str, Any]
+    fit: Callable[..., "Fit"]
+    check: Callable[..., Any] = field(compare=False)
+    criticise: Callable[..., Any] = field(compare=False)
 
 
 class Closest(NamedTuple):
@@ -346,9 +349,9 @@ class Fit(Displayed):
             "fit_status": self.status,
             **{f"seconds_{part}": spent for part, spent in seconds.items()},
         }
-        return results_tree(self, made, seed, attributes)
+        return results_tree(self, self.warnings, made, seed, attributes)
 
-    def check(self, n: int = 200, **how: Any) -> "FitCheck":
+    def check(self, n: int = 200, **how: Any) -> Any:
         """Ranks and coverage of the pipeline that made this fit, on n data sets of known truth.
 
         Each truth is drawn from the prior, and its data are simulated, fitted and sampled as these
@@ -358,28 +361,30 @@ class Fit(Displayed):
             n: Data sets.
             how: See `checks.check_fit`.
 
+        Returns:
+            A `checks.FitCheck`.
+
         Raises:
             ValueError: the fit has no `recipe`, or an argument is bad.
         """
-        from .checks import check_fit
+        return self.recipe.check(self, n, **how)
 
-        return check_fit(self, n, **how)
-
-    def criticise(self, extensions: "Extensions", **how: Any) -> "Criticism":
+    def criticise(self, extensions: Mapping[str, Any], **how: Any) -> Any:
         """Where simulator and data disagree, and which of the extensions explains it.
 
         The simulations of this fit are those of the base model, whatever the surrogate.
 
         Args:
-            extensions: What the simulator may lack, by name.
+            extensions: Name -> `criticism.Extension`, which the simulator may lack.
             how: See `criticism.criticise_fit`.
+
+        Returns:
+            A `criticism.Criticism`.
 
         Raises:
             ValueError: the fit has no `recipe`, its noise is not known, or an argument is bad.
         """
-        from .criticism import criticise_fit
-
-        return criticise_fit(self, extensions, **how)
+        return self.recipe.criticise(self, extensions, **how)
 
     def plot_search(self, ax: "Axes | None" = None) -> "Axes":
         """Discrepancy of every simulation by the round in which it was asked.
@@ -409,6 +414,8 @@ class Fit(Displayed):
         Raises:
             ValueError: `sampled` is no tree, or `axes` are no axes of Matplotlib, or too few.
         """
-        from .figures import plot_predictive
+        from .figures import check_axes, plot_predictive
 
-        return plot_predictive(self, sampled, axes)
+        check_axes(axes)
+        tree = self.sample(draws=250, warmup=250, warn=False) if sampled is None else sampled
+        return plot_predictive(self.observed, self.closest.signal, tree, axes)

@@ -7,8 +7,6 @@ from .of_fit import FitCheck as FitCheck
 from .of_fit import check_fit as check_fit
 from .one_replicate import Pipeline as Pipeline
 from .one_replicate import Replicate as Replicate
-from .pipelines import FitPipeline as FitPipeline
-from .pipelines import shared_design as shared_design
 from .random_points import Tarp as Tarp
 from .random_points import tarp as tarp
 from .uniformity import SBC as SBC

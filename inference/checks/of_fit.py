@@ -2,18 +2,22 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from inspect import signature
 from typing import Any
 
 import numpy as np
 
+from .._lazy import xr
+from ..arguments import checked_mapping
 from ..criticism.measurement_noise import Noise, samples
 from ..criticism.of_fit import noise_of
-from ..result import Fit
+from ..prior import Prior
+from ..result import Fit, Recipe
+from ..types import Simulator
 from .finished_replicates import Judged
 from .intervals import Coverage, coverage
 from .many_replicates import replicates
-from .one_replicate import Observe
-from .pipelines import FitPipeline
+from .one_replicate import LogDensity, Observe
 from .random_points import Tarp, tarp
 from .uniformity import SBC, sbc
 
@@ -62,6 +66,39 @@ class LikeObserved:
         return signal + gaps
 
 
+@dataclass(frozen=True)
+class Refit:
+    """The pipeline that made a fit, on other data.
+
+    Attributes:
+        recipe: How it was made.
+        prior: The parameters and their priors.
+        sampling: Options of `Fit.sample`.
+    """
+
+    recipe: Recipe
+    prior: Prior
+    sampling: Mapping[str, Any]
+
+    @property
+    def simulate(self) -> Simulator:
+        """The simulator, of batches."""
+        return self.recipe.simulate
+
+    def __call__(self, observed: np.ndarray, seed: int) -> "tuple[xr.DataTree, LogDensity]":
+        of = self.recipe
+        how = {"budget": of.budget, "seed": seed, "progress": False, "warn": False, **of.options}
+        made = of.fit(of.simulate, self.prior, observed, **how)
+        return made.sample(seed=seed, **{"warn": False, **self.sampling}), made.log_prob
+
+
+def check_sampling(options: Mapping[str, Any]) -> None:
+    """Raise ValueError for options that `Fit.sample` refuses."""
+    allowed = set(signature(Fit.sample).parameters) - {"self", "seed"}
+    if wrong := set(checked_mapping("sampling", options, "values")) - allowed:
+        raise ValueError(f"sampling must be among {sorted(allowed)}, got {sorted(wrong)}")
+
+
 def check_fit(
     fit: Fit,
     n: int = 200,
@@ -93,7 +130,6 @@ def check_fit(
                 "adds it: (signal, rng) -> observed"
             )
         observe = LikeObserved(np.isfinite(fit.observed), noise)
-    given = recipe.simulate, fit.prior, recipe.budget, recipe.options, sampling or {}
-    pipeline = FitPipeline(*given, warn=False)
-    made = replicates(pipeline, n=n, observe=observe, **how)
+    check_sampling(sampling or {})
+    made = replicates(Refit(recipe, fit.prior, sampling or {}), n=n, observe=observe, **how)
     return FitCheck(sbc(made), coverage(made), tarp(made))

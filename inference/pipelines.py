@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .._lazy import xr
-from ..arguments import (
+from ._lazy import xr
+from .arguments import (
     check_flag,
     check_function,
     check_progress,
@@ -18,20 +18,20 @@ from ..arguments import (
     checked_integer,
     checked_mapping,
 )
-from ..bolfi import MIN_LEARN, MOST_SIMULATIONS
-from ..loop import fit
-from ..prior import Prior, checked_prior
-from ..progress import progress_bar
-from ..result import Fit
-from ..simulations.bank import SimulationBank
-from ..simulations.compute import open_compute
-from ..simulations.executors import Workers
-from ..simulations.job import BATCH, batched, jobs, simulation_seed, stacked
-from ..simulations.runner import run_missing
-from ..sobol import sobol
-from ..surrogates.families import resolve
-from ..types import Simulator, SingleSimulator
-from .one_replicate import LogDensity
+from .bolfi import MIN_LEARN, MOST_SIMULATIONS
+from .checks.of_fit import check_sampling
+from .checks.one_replicate import LogDensity
+from .loop import fit
+from .prior import Prior, checked_prior
+from .progress import progress_bar
+from .simulations.bank import SimulationBank
+from .simulations.compute import open_compute
+from .simulations.executors import Workers
+from .simulations.job import BATCH, batched, jobs, simulation_seed, stacked
+from .simulations.runner import run_missing
+from .sobol import sobol
+from .surrogates.families import resolve
+from .types import Simulator, SingleSimulator
 
 Options = Mapping[str, Any]
 
@@ -44,15 +44,10 @@ def _check_options(options: Options, sampling: Options) -> None:
     known = signature(fit).parameters
     of_family = {name: value for name, value in options.items() if name not in known}
     resolve(options.get("surrogate"), of_family)
-    _check_names("options", options, set(known) | set(of_family))
-    _check_names("sampling", sampling, set(signature(Fit.sample).parameters))
-
-
-def _check_names(which: str, given: Options, known: set[str]) -> None:
-    allowed = known - OF_PIPELINE - {"self", "options"}
-    wrong = [name for name in given if name not in allowed]
-    if wrong:
-        raise ValueError(f"{which} must be among {sorted(allowed)}, got {wrong}")
+    allowed = {*known, *of_family} - OF_PIPELINE - {"options"}
+    if wrong := set(options) - allowed:
+        raise ValueError(f"options must be among {sorted(allowed)}, got {sorted(wrong)}")
+    check_sampling(sampling)
 
 
 @dataclass(frozen=True)
