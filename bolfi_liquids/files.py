@@ -70,7 +70,7 @@ def new_file(path: str | Path, where: str, *, suffix: str = "", replace: bool = 
             file, or no file can be made in its directory.
     """
     path = given_path(path, where)
-    if not path.name.endswith(suffix):
+    if suffix and path.suffix != suffix:
         what = f"ends in {path.suffix!r}"
         raise InputError(what, where=str(path), fix=f"give a name in {suffix}")
     if path.exists() and not replace:

@@ -4,7 +4,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..files import new_file, write_text
+from ..files import new_file
 from .open import open_recording
 from .recording import Recording
 
@@ -35,6 +35,9 @@ def write_template(name: str, path: str | Path) -> Path:
 
     Raises:
         InputError: There is a file already, or none can be made there.
+        FileExistsError: Somebody has made one in between; it stays as it is.
     """
     target = new_file(path, "FILE", replace=False)
-    return write_text(target, (files(TEMPLATES[name]) / name).read_text(encoding="utf-8"))
+    with target.open("x", encoding="utf-8") as file:
+        file.write((files(TEMPLATES[name]) / name).read_text(encoding="utf-8"))
+    return target

@@ -11,9 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .described_liquid import number_of
 from .fields import AXES, PLANES, STICK_WEIGHT
 from .recording import JUMPS, Recording, steps, torn_values
 from .start import above_liquid, noise_of
+
+INF, ABOVE_0, BELOW_1 = np.inf, float(np.finfo(float).tiny), float(np.nextafter(1.0, 0.0))
 
 LIMITS = {
     "cup_radius": (5e-3, 0.25, "m"),
@@ -23,7 +26,7 @@ LIMITS = {
     "stick_length": (0.02, 1.0, "m"),
     "liquid_density": (50.0, 20_000.0, "kg/m3"),
     "stick_density": (50.0, 20_000.0, "kg/m3"),
-    "stick_mass": (1e-6, 2.0, "kg"),
+    "stick_mass": (ABOVE_0, 2.0, "kg"),
 }
 """Smallest and largest value of each attribute, and its unit."""
 
@@ -94,21 +97,20 @@ def check_values(recording: Recording) -> None:
     sizes = [
         Rule((name,), "", _size, least, most, unit, f"give a number in {unit}, or measure it again")
         for name, (least, most, unit) in LIMITS.items()
-        if name in recording.attrs
+        if name in recording.attrs or name not in STICK_WEIGHT
     ]
     for rule in (*sizes, *RULES):
         rule.check(recording)
 
 
 def _size(recording: Recording, field: str) -> Measured:
-    """An attribute; NaN where it is no number."""
-    value = recording.attrs[field]
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return value
-    return np.nan, f" ({' '.join(repr(value).split()):.80})"
+    """An attribute, which must be a number."""
+    return number_of(recording.attrs.get(field), f"{recording.path}: attribute {field}")
 
 
 def _span(least: float, most: float) -> str:
+    if least == ABOVE_0:
+        return f"above 0 to {most:g}"
     if not np.isfinite(most):
         return f"at least {least:g}"
     return f"{least:g}" if least == most else f"{least:g} to {most:g}"
@@ -312,7 +314,6 @@ def _buoyancy(recording: Recording, field: str) -> Measured:
     return lifted / (mass * stick.length / 2), f" (a stick of {1000 * mass:.3g} g floats up)"
 
 
-INF, BELOW_1 = np.inf, float(np.nextafter(1.0, 0.0))
 TIME, WEIGHT = ("time",), (" or ".join(STICK_WEIGHT),)
 XY, ALL, TIP = ("x, y",), (", ".join(JUMPS),), ("z, stick_length",)
 LEANS = (", ".join(PLANES),)

@@ -82,9 +82,16 @@ def number_of(value: Any, where: str) -> float:
     Raises:
         InputError: It is something else; `where` is named.
     """
-    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-        raise InputError(f"{value!r:.80}", where=where, fix="give one finite number")
-    return float(value)
+    if not math.isfinite(number := _as_number(value)):
+        given = " ".join(repr(value).split())
+        raise InputError(f"{given:.80}", where=where, fix="give one finite number")
+    return number
+
+
+def _as_number(value: Any) -> float:
+    """The value, which may be an array without axes; NaN where it is no number."""
+    plain = value.item() if getattr(value, "shape", None) == () else value
+    return float(plain) if isinstance(plain, Real) and not isinstance(plain, bool) else math.nan
 
 
 def read_effects(given: Iterable[str], scene: str) -> dict[str, float]:
@@ -124,9 +131,8 @@ def check_effects(effects: Mapping[str, Any] | None, scene: str) -> dict[str, fl
             f"{effects!r:.80}", where=Argument("effects"), fix="give coefficients by name"
         )
     for name, value in effects.items():
-        is_number = isinstance(value, Real) and not isinstance(value, bool)
-        number = float(value) if is_number else math.nan
-        where = f"--effect {name}={f'{number:g}' if is_number else value}"
+        number = _as_number(value)
+        where = f"--effect {name}={value if math.isnan(number) else f'{number:g}'}"
         if name not in EFFECTS:
             raise InputError("unknown", where=where, fix=f"there are {', '.join(sorted(EFFECTS))}")
         effect = EFFECTS[name]
@@ -139,4 +145,4 @@ def check_effects(effects: Mapping[str, Any] | None, scene: str) -> dict[str, fl
             )
         if scene not in effect.scenes:
             raise InputError(f"does not act in a {scene}", where=where, fix="leave it out")
-    return {name: float(value) for name, value in effects.items()}
+    return {name: _as_number(value) for name, value in effects.items()}

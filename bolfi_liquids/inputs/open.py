@@ -16,6 +16,18 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 HDF5, CLASSIC_NETCDF = b"\x89HDF\r\n\x1a\n", b"CDF"  # how such files begin
+DAMAGE = (
+    OSError,
+    ValueError,
+    RuntimeError,
+    LookupError,
+    AttributeError,
+    TypeError,
+    ArithmeticError,
+    MemoryError,
+)
+"""What the libraries that read NetCDF raise where bytes of a file are wrong."""
+
 Source = Recording | str | Path
 
 
@@ -98,7 +110,7 @@ def read_fields(content: bytes, path: Path) -> "Dataset":
                 list(file.attrs.items())
         # times stay numbers: a unit such as "ms" is then seen, not silently converted
         dataset = xarray.load_dataset(io.BytesIO(content), decode_times=False)
-    except Exception as err:  # the libraries raise whatever wrong bytes lead to
+    except DAMAGE as err:
         raise InputError("damaged, cannot be read", where=str(path), fix="copy it again") from err
     check_fields(dataset, path)
     return dataset

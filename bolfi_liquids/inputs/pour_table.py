@@ -195,7 +195,7 @@ def check_distance(distance: float, cups: "Cups", where: str) -> None:
         f"{100.0 * distance:g} cm; the cups stand {100.0 * low:g} to {100.0 * high:g} cm apart",
         where=where,
         fix="give the distance from the lip to the receiver's axis in cm, or the cups that were "
-        "poured with",
+        f"poured with{_in_python('m', where)}",
     )
 
 
@@ -208,8 +208,14 @@ def check_rate(rate: float, cups: "Cups", where: str) -> None:
     raise InputError(
         f"{given:g} deg/s; the cups are turned at {slow:g} to {fast:g} deg/s",
         where=where,
-        fix="give the angular velocity in deg/s, or the cups that were poured with",
+        fix="give the angular velocity in deg/s, or the cups that were poured with"
+        + _in_python("rad/s", where),
     )
+
+
+def _in_python(unit: str, where: str) -> str:
+    """What a function takes in another unit than a table or a command."""
+    return f"; in Python, in {unit}" if isinstance(where, Argument) else ""
 
 
 def _of_liquid(table: Table, liquid: str | None) -> tuple[Table, str]:

@@ -3,7 +3,9 @@
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -47,7 +49,7 @@ class Trajectory(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Recording:
-    """One stir, as recorded; arrays are read-only, missing samples are NaN.
+    """One stir, as recorded; arrays and attributes are read-only, missing samples are NaN.
 
     Attributes:
         time: Times of the samples [s], shape (T,), increasing.
@@ -67,6 +69,13 @@ class Recording:
     path: Path
     hash: str
     torn: tuple[str, ...] = ()
+
+    def __post_init__(self):
+        object.__setattr__(self, "attrs", MappingProxyType(dict(self.attrs)))
+
+    def __reduce__(self):
+        """Processes that simulate need it, and a mapping proxy cannot be pickled."""
+        return partial(Recording, **{**vars(self), "attrs": dict(self.attrs)}), ()
 
     def __repr__(self) -> str:
         told = "; ".join(f"{name} {value}" for name, value in self.subjects().items())

@@ -3,6 +3,7 @@
 import tomllib
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
@@ -37,9 +38,13 @@ def read_toml[Model: BaseModel](path: str | Path, model: type[Model], fix: str) 
 
 def _likely(err: ValidationError, model: type[BaseModel]) -> str:
     """A question for the field that an unknown one is probably meant to be; "" without one."""
-    unknown = [str(one["loc"][-1]) for one in err.errors() if one["type"] == "extra_forbidden"]
-    schema = model.model_json_schema()
-    tables = (schema, *schema.get("$defs", {}).values())
-    known = [name for table in tables for name in table.get("properties", ())]
-    close = get_close_matches(unknown[0], known, n=1, cutoff=0.5) if unknown else []
+    unknown = [one["loc"] for one in err.errors() if one["type"] == "extra_forbidden"]
+    if not unknown:
+        return ""
+    *tables, name = map(str, unknown[0])
+    owner: Any = model
+    for table in tables:
+        field = getattr(owner, "model_fields", {}).get(table)
+        owner = field and field.annotation
+    close = get_close_matches(name, getattr(owner, "model_fields", {}), n=1, cutoff=0.5)
     return f"did you mean {close[0]}?" if close else ""

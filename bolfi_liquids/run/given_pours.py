@@ -16,6 +16,8 @@ from ..inputs.pour_table import PourTable
 from .result_file import read_result, write_result
 
 if TYPE_CHECKING:
+    from xarray import Dataset
+
     from ..models import Cups
 
 GIVEN_POURS = "given_pours.nc"
@@ -48,15 +50,8 @@ def kept_pours(run: Path, cups: "Cups") -> PourTable | None:
     Raises:
         InputError: The file is damaged.
     """
-    path = run / GIVEN_POURS
-    if not path.is_file():
-        return None
-    try:
-        held = read_result(path).to_dataset()
-    except (OSError, ValueError) as err:
-        fix = "delete it, and give the table of pours again"
-        raise InputError("is damaged", where=str(path), fix=fix) from err
-    if json.loads(held.attrs["cups"]) != _scene(cups):
+    held = _held(run)
+    if held is None or json.loads(held.attrs["cups"]) != _scene(cups):
         return None
     return PourTable(
         path=Path(held.attrs["file"]),
@@ -70,9 +65,29 @@ def kept_pours(run: Path, cups: "Cups") -> PourTable | None:
 
 
 def digest_of_pours(run: Path) -> str:
-    """Digest of the table that the run was given, with its cups; "" without one."""
+    """Digest of the table that the run was given, of its liquid's name and cups; "" without one.
+
+    That of a damaged file equals no other.
+    """
+    try:
+        held = _held(run)
+    except InputError as err:
+        return str(err)
+    if held is None:
+        return ""
+    told = [held.attrs[name] for name in ("sha256", "liquid", "cups")]
+    return hashlib.sha256(json.dumps(told).encode()).hexdigest()
+
+
+def _held(run: Path) -> "Dataset | None":
     path = run / GIVEN_POURS
-    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+    if not path.is_file():
+        return None
+    try:
+        return read_result(path).to_dataset()
+    except (OSError, ValueError) as err:
+        fix = "delete it, and give the table of pours again"
+        raise InputError("is damaged", where=str(path), fix=fix) from err
 
 
 def _scene(cups: "Cups") -> dict[str, Any]:

@@ -11,6 +11,7 @@ from ..inputs.open import read_fields
 from ..inputs.recording import Recording, as_recording
 
 RECORDINGS_FOLDER = "recordings"
+MAX_LETTERS = 60  # of a name, each of at most four bytes
 
 
 def keep_recordings(run: Path, recordings: tuple[Recording, ...]) -> None:
@@ -58,4 +59,5 @@ def kept_paths(run: Path, record: Mapping[str, Any]) -> tuple[Path, ...]:
 
 
 def _name(number: int, name: str) -> str:
-    return f"{number}-{name}"
+    """Of a copy: the end of a long name, so that the copy's fits into the 255 bytes of a file's."""
+    return f"{number}-{name[-MAX_LETTERS:]}"

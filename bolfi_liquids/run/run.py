@@ -57,8 +57,8 @@ OWN_FILES = (SIMULATIONS, *RESULTS.values(), GIVEN_POURS, RECORDINGS_FOLDER, MOV
 MUST_AGREE = ("settings", "inputs", "simulator", "engine")
 """Sections of run.toml that decide the results; dates, names and libraries may differ."""
 
-LAST_SECTION = "versions"
-"""Of run.toml: a file without it was cut off."""
+SECTIONS = ("settings", "versions")
+"""Of every run.toml, the last one included: a file that lacks one was cut off."""
 
 ABSENT = {
     "calibrate": "the calibration in it is not finished",
@@ -106,9 +106,13 @@ class Run:
         """Read the settings of a run.
 
         Raises:
-            InputError: There is none, or another version of fluid or engine made it.
+            InputError: There is none, it was cut off, or another version of fluid or engine made
+                it.
         """
         run = cls(path := run_path(given), _read(path))
+        if missing := [name for name in SECTIONS if not run.record.get(name)]:
+            what = f"is cut off: it has no {missing[0]}"
+            raise InputError(what, where=str(path / RUN_TOML), fix="restore the file")
         run._check_generation()
         return run
 
@@ -417,7 +421,7 @@ def _read(path: Path) -> dict[str, Any]:
     """run.toml.
 
     Raises:
-        InputError: There is none, it is not TOML, or its end is missing.
+        InputError: There is none, or it is not TOML.
     """
     file = path / RUN_TOML
     if not file.is_file():
@@ -427,13 +431,9 @@ def _read(path: Path) -> dict[str, Any]:
             fix="give the directory of a run, as made by: bolfi-liquids calibrate ... --out RUN",
         )
     try:
-        record = tomllib.loads(file.read_text(encoding="utf-8"))
+        return tomllib.loads(file.read_text(encoding="utf-8"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as err:
         raise InputError(f"not TOML ({err})", where=str(file), fix="restore the file") from err
-    if "settings" in record and LAST_SECTION not in record:
-        what = f"is cut off: it ends before its section {LAST_SECTION}"
-        raise InputError(what, where=str(file), fix="restore the file")
-    return record
 
 
 def _check_no_results(path: Path) -> None:

@@ -28,7 +28,7 @@ OTHERS = {
     "another budget": lambda: of_the_demo(budget=8),
     "another seed": lambda: of_the_demo(seed=3),
     "another recording": lambda: of_the_demo() | {"inputs": {"sha256": ["ab"]}},
-    "something else": lambda: {"a": {"b": 1}},
+    "something else": lambda: {"settings": {"a": 1}, "versions": {"b": "1"}},
 }
 
 

@@ -35,7 +35,11 @@ def test_the_cups_of_a_result_are_those_it_was_made_with():
 
 @pytest.mark.parametrize(
     ("right", "wrong", "likely"),
-    [("[receiver]", "[reciever]", "receiver"), ("lip_height", "lip_hight", "lip_height")],
+    [
+        ("[receiver]", "[reciever]", "receiver"),
+        ("lip_height", "lip_hight", "lip_height"),
+        ("lip_height", "radius", "compare with"),  # a field of other tables
+    ],
 )
 def test_an_unknown_key_is_named_with_the_likeliest(tmp_path, right, wrong, likely):
     text = (files("bolfi_liquids.data") / "cups.toml").read_text(encoding="utf-8")

@@ -1,15 +1,20 @@
 """Every bad recording is refused in one line that names file, field and value."""
 
+import pickle
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 from typer.testing import CliRunner
 
 import bolfi_liquids as bl
 from bolfi_liquids.cli.app import app
+from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.checks import MAX_GRIPPER_GAP, longest_gap
+from bolfi_liquids.inputs.open import check_recording
 from bolfi_liquids.inputs.recording import Recording, Trajectory
 
 GAP = slice(60, 75)  # half a second
@@ -113,7 +118,13 @@ BAD = {
     "no cup": (without_attribute("cup_radius"), "cup_radius", "missing"),
     "no weight": (without_attribute("stick_density"), "stick_density or stick_mass", "missing"),
     "negative radius": (with_attribute("cup_radius", -0.04), "cup_radius", "-0.04"),
-    "radius as text": (with_attribute("stick_radius", "4.5 mm"), "stick_radius", "'4.5 mm'"),
+    "radius as text": (
+        with_attribute("stick_radius", "4.5 mm"),
+        "stick_radius",
+        ": '4.5 mm'; give one",
+    ),
+    "no mass": (with_attribute("stick_mass", 0.0), "stick_mass", "0 kg, above 0 to 2 kg allowed"),
+    "light stick": (with_attribute("stick_mass", 5e-7), "or stick_mass", "0.0005 g floats up"),
     "cup in mm": (with_attribute("cup_height", 75.0), "cup_height", "75 m"),
     "g/cm3": (with_attribute("liquid_density", 1.26), "liquid_density", "1.26"),
     "overfull": (with_attribute("fill", 0.08), "fill", "0.08"),
@@ -244,6 +255,28 @@ def test_recording_has_the_files_values(dataset, tmp_path):
     assert recording.attrs["status"] == "aborted"
     with pytest.raises(ValueError, match="read-only"):
         recording.inclination[0, 0] = 1.0
+    for one in (recording, pickle.loads(pickle.dumps(recording)), recording.first(9)):
+        assert one.attrs == recording.attrs and one.hash == recording.hash
+        with pytest.raises(TypeError):
+            one.attrs["liquid_density"] = 5.0
+
+
+@pytest.mark.parametrize("name", ["fill", "liquid_density"])
+def test_a_recording_without_a_size_is_refused(name):
+    whole = bundled_recording("water")
+    attrs = {key: value for key, value in whole.attrs.items() if key != name}
+    with pytest.raises(bl.InputError, match=f"attribute {name}: None"):
+        check_recording(replace(whole, attrs=attrs))
+
+
+@pytest.mark.parametrize("error", [ImportError, NameError])
+def test_what_no_wrong_byte_leads_to_is_no_damage(monkeypatch, error):
+    def load(*_, **__):
+        raise error
+
+    monkeypatch.setattr(xarray, "load_dataset", load)
+    with pytest.raises(error):
+        bundled_recording("water")
 
 
 def test_hash_follows_the_bytes(dataset, tmp_path):

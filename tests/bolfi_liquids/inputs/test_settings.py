@@ -6,8 +6,10 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 from bolfi_liquids.inference.bolfi import MOST_SIMULATIONS
+from xarray import DataArray
 
 from bolfi_liquids.errors import InputError
+from bolfi_liquids.inputs.described_liquid import check_effects, number_of
 from bolfi_liquids.inputs.settings import (
     MAX_SIMULATIONS,
     MIN_SIMULATIONS,
@@ -92,3 +94,17 @@ def test_settings_are_plain_values():
 def test_an_effect_that_is_named_twice_counts_once():
     settings = CriticismSettings(effects=("a", "b", "a"), accept=("b", "b"))
     assert (settings.effects, settings.accept) == (("a", "b"), ("b",))
+
+
+@pytest.mark.parametrize("number", [0.1, np.float32(0.1), np.array(0.1), DataArray(0.1)])
+def test_a_number_may_be_an_array_without_axes(number):
+    assert number_of(number, "a") == check_effects({"adhesion": number}, "pour")["adhesion"]
+    assert type(number_of(number, "a")) is float
+
+
+@pytest.mark.parametrize("other", [True, "0.1", None, np.array([0.1]), np.array(True), np.nan])
+def test_what_is_no_number_is_refused(other):
+    with pytest.raises(InputError, match="^a: .*give one finite number"):
+        number_of(other, "a")
+    with pytest.raises(InputError, match="^--effect adhesion=.*give adhesion=NUMBER"):
+        check_effects({"adhesion": other}, "pour")

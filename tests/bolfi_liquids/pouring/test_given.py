@@ -2,6 +2,8 @@
 
 import json
 import shutil
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring.draining import Draining, hold_of
 from bolfi_liquids.reporting.warnings import Results, warnings_of
-from bolfi_liquids.run.given_pours import GIVEN_POURS, kept_pours
+from bolfi_liquids.run.given_pours import GIVEN_POURS, digest_of_pours, keep_pours, kept_pours
 from bolfi_liquids.run.run import Run
 from bolfi_liquids.simulators import PourSimulator
 
@@ -143,6 +145,24 @@ def outdated(run):
     """Whether a warning names the command that chooses the pour again."""
     again = Run.open(run).again("pour")
     return any(again in warning for warning in warnings_of(Results.of(Run.open(run))))
+
+
+def test_what_counts_of_a_table_is_its_content_liquid_and_cups(tmp_path):
+    rows, cups = [(20.0, 3.0, 0.1, 0.8, 0.1), (20.0, 4.0, 0.2, 0.7, 0.1)] * 2, bundled_cups()
+    table = bl.open_pours(written(tmp_path / "a.csv", rows))
+    renamed = bl.open_pours(written(tmp_path / "b.csv", rows))
+    shorter = bl.open_pours(written(tmp_path / "c.csv", rows[:3]))
+    wider = cups.model_copy(update={"receiver": cups.receiver.model_copy(update={"radius": 0.03})})
+
+    def digest(table, cups=cups):
+        keep_pours(tmp_path, table, cups)
+        return digest_of_pours(tmp_path)
+
+    assert digest(table) == digest(renamed) and kept_pours(tmp_path, cups).path == Path("b.csv")
+    others = {digest(shorter), digest(replace(table, liquid="water")), digest(table, wider)}
+    (tmp_path / GIVEN_POURS).write_bytes(b"cut off")
+    others.add(digest_of_pours(tmp_path))
+    assert len(others) == 4 and digest(table) not in others
 
 
 def test_pours_of_other_cups_do_not_count(chosen, tmp_path, caplog):

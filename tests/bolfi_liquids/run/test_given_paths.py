@@ -8,6 +8,8 @@ import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids.errors import InputError
+from bolfi_liquids.files import new_file
+from bolfi_liquids.inputs import bundled as bundled_files
 from bolfi_liquids.inputs.settings import (
     CalibrationSettings,
     CriticismSettings,
@@ -48,6 +50,21 @@ def test_an_empty_path_is_not_the_current_directory(monkeypatch, tmp_path, funct
     with pytest.raises(InputError, match="is empty"):
         given_nothing(out)[function]()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_was_made_in_between_stays(monkeypatch, tmp_path):
+    mine = tmp_path / "rig.toml"
+    mine.write_text("mine")
+    monkeypatch.setattr(bundled_files, "new_file", lambda path, *_, **__: path)
+    with pytest.raises(FileExistsError):
+        bundled_files.write_template("rig.toml", mine)
+    assert mine.read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", [".nc", "stir", "stir.csv", "nc", "stir.nc.txt"])
+def test_a_name_that_ends_otherwise_is_refused(tmp_path, name):
+    with pytest.raises(InputError, match=r"ends in '.*give a name in \.nc"):
+        new_file(tmp_path / name, "out", suffix=".nc")
 
 
 @pytest.mark.parametrize(

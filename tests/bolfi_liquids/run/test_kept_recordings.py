@@ -7,6 +7,7 @@ import pytest
 
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.bundled import bundled_recording
+from bolfi_liquids.inputs.open import read_recording
 from bolfi_liquids.run.recordings import keep_recordings, kept_recordings
 
 DAMAGES = {
@@ -31,6 +32,19 @@ def run(tmp_path):
 def test_a_copy_is_the_recording(run):
     (kept,) = kept_recordings(run.path, run.record)
     assert kept.path == run.copy
+
+
+@pytest.mark.parametrize("name", ["a" * 252 + ".nc", "ä" * 126 + ".nc", "𝄞" * 63 + ".nc"])
+def test_a_recording_of_any_name_is_copied(tmp_path, run, name):
+    given = tmp_path / name
+    given.write_bytes(run.copy.read_bytes())
+    recordings = (read_recording(run.copy), read_recording(given))
+    keep_recordings(tmp_path, recordings)
+    digests = [one.hash for one in recordings]
+    names = [one.path.name for one in recordings]
+    record = {"files": {"recordings": names}, "inputs": {"sha256": digests}}
+    copies = {one.path for one in kept_recordings(tmp_path, record)}
+    assert len(copies) == 2 and copies <= set((tmp_path / "recordings").iterdir())
 
 
 @pytest.mark.parametrize("damage", DAMAGES)

@@ -17,7 +17,11 @@ from bolfi_liquids.errors import InputError
 from bolfi_liquids.run.lock import LOCK, alone_in
 from bolfi_liquids.run.run import RUN_TOML, Run
 
-RECORD = {"settings": {"budget": 20, "seed": 0}, "inputs": {"sha256": ["ab"]}, "versions": {}}
+RECORD = {
+    "settings": {"budget": 20, "seed": 0},
+    "inputs": {"sha256": ["ab"]},
+    "versions": {"numpy": "2.0"},
+}
 
 
 def commands_in(run):

@@ -114,15 +114,17 @@ def test_a_record_that_is_no_toml_is_named(tmp_path, content):
         Run.open(tmp_path)
 
 
-def test_a_record_that_is_cut_off_is_named_though_it_is_toml(run):
+@pytest.mark.parametrize("last", ["created", "\n[settings]", "[versions]", "[versions]\n"])
+def test_a_record_that_is_cut_off_is_named_though_it_is_toml(run, last):
     text = (run.path / RUN_TOML).read_text(encoding="utf-8")
-    (run.path / RUN_TOML).write_text(text[: text.index("[versions]")], encoding="utf-8")
+    end = text.index(last) + (len(last) if last.endswith("\n") else 0)
+    (run.path / RUN_TOML).write_text(text[:end], encoding="utf-8")
     with pytest.raises(InputError, match=r"run\.toml: is cut off.*restore the file"):
         bl.Calibration.open(run.path)
 
 
 def test_what_is_no_run_has_no_result_and_says_what_makes_one(tmp_path):
-    (tmp_path / RUN_TOML).write_text("[a]\nb = 1\n", encoding="utf-8")
+    begin(tmp_path)
     with pytest.raises(InputError, match="not finished; run: bolfi-liquids calibrate RECORDING"):
         bl.choose_pour(tmp_path)
 
