@@ -33,6 +33,13 @@ def test_who_interrupts_is_told_to_resume_only_what_has_begun(tmp_path, monkeypa
     assert "--resume" not in _how_to_go_on(["pour", "run"])
 
 
+@pytest.mark.parametrize("out", [[], ["--out"], ["--out", "--budget"], ["--out", 300 * "n"]])
+def test_who_interrupts_without_a_place_is_told_to_begin_again(tmp_path, monkeypatch, out):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "run.toml").touch()  # of no run that was named
+    assert "begin again" in _how_to_go_on(["calibrate", "stir.nc", *out])
+
+
 TYPED = {
     "calibrate": (["stir.nc", "--out", "r", "--budget", "1"], "--budget: 1;"),
     "simulate pour": (["--angular-velocity", "0"], "--angular-velocity: 0 deg/s;"),
