@@ -34,10 +34,14 @@ def phases(*, shown: bool) -> Iterator[Callable[[str, int], None]]:
         Called with the phase and the simulations finished in it since the last call.
     """
     from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True, quiet=not shown)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     count, current = 0, ""
-    with console.status("starting") as status:  # nothing without a terminal
+    # a display takes over stdout and stderr even where the console is quiet
+    with Progress(*columns, console=console, disable=not (shown and console.is_terminal)) as bar:
+        handle = bar.add_task("starting", total=None)
 
         def report(phase: str, finished: int) -> None:
             nonlocal count, current
@@ -45,6 +49,6 @@ def phases(*, shown: bool) -> Iterator[Callable[[str, int], None]]:
                 console.print(f"{phase} (after {count} simulations)", highlight=False)
             count += finished
             current = phase
-            status.update(f"{phase} ({count} simulations)")
+            bar.update(handle, description=f"{phase} ({count} simulations)")
 
         yield report

@@ -185,8 +185,11 @@ def _draw_marginals(
 def grid_density(
     surface: "Dataset", name: str = "log_posterior"
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-    """Density over the drawn coordinates, up to a constant, in the grid's shape; and these:
-    logarithms where an axis is logarithmic."""
+    """Density on a grid, and its coordinates; of a logarithmic parameter those are logarithms.
+
+    Returns:
+        Density over the coordinates, up to a constant, in the grid's shape; coordinates by axis.
+    """
     log_density = surface[name].to_numpy()
     coordinates = []
     for axis, parameter in enumerate(surface[name].dims):

@@ -187,14 +187,10 @@ def report(
     A criticism or a pour that does not count is left out, with a warning; the exit status is 0.
     """
     from ..reporting.report import report as write_report
-    from ..reporting.warnings import Results
-    from ..run.run import Run
 
     with compute.arguments() as where:
         path = write_report(run, moving=moving, **where)
     typer.echo(path)
-    for warning in Results.of(Run.open(run)).outdated:
-        typer.echo(f"warning: {warning}", err=True)
 
 
 @app.command(epilog=examples("demo --out runs/demo"))

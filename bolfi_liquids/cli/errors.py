@@ -5,9 +5,8 @@ import os
 import sqlite3
 import sys
 import traceback
-from argparse import ArgumentParser
+from collections.abc import Iterator
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import typer
@@ -109,13 +108,18 @@ def _refuse_empty(arguments: list[str]) -> None:
     Raises:
         InputError: There is one.
     """
-    for before, argument in pairwise(["", *arguments]):
-        option, value = before, argument
-        if argument.startswith("--") and "=" in argument:
-            option, _, value = argument.partition("=")
+    for option, value in _values(arguments):
         if not value.strip():
             named = option if option.startswith("-") else "an argument"
             raise InputError("is empty", where=named, fix="give a value; was a variable not set?")
+
+
+def _values(arguments: list[str]) -> Iterator[tuple[str, str]]:
+    """Each argument, as a value of the option in it or before it."""
+    for before, argument in pairwise(["", *arguments]):
+        option, given, value = argument.partition("=")
+        own = given and option.startswith("--")
+        yield (option, value) if own else (before, argument)
 
 
 def _explained(err: Exception) -> str:
@@ -144,10 +148,8 @@ def _how_to_go_on(arguments: list[str]) -> str:
 
     again, begun = command(*arguments), True
     if "calibrate" in arguments and "--resume" not in arguments:
-        options = ArgumentParser(add_help=False, allow_abbrev=False)
-        options.add_argument("--out", type=Path)
-        out = options.parse_known_args(arguments)[0].out
-        begun = out is not None and (out / RUN_TOML).exists()
+        out = dict(_values(arguments)).get("--out", "")
+        begun = out != "" and os.path.exists(os.path.join(out, RUN_TOML))
         again += " --resume" if begun else ""
     if not begun:
         return f"interrupted before anything was kept; begin again with: {again}"

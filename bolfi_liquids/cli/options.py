@@ -133,10 +133,13 @@ class ExecutionOptions:
 
 
 def need(options: object, needed: str, *names: str) -> None:
-    """Refuse options `names` of a group where the option `needed` was not given."""
+    """Refuse options `names` of a group where the option `needed` was not given.
+
+    Their default is None or False, which nobody can type.
+    """
     for name in names:
-        usual = type(options).__dataclass_fields__[name].default  # type: ignore[attr-defined]
-        if getattr(options, name) != usual and not getattr(options, needed):
+        value = getattr(options, name)
+        if value is not None and value is not False and not getattr(options, needed):
             given, missing = as_typed(name, needed)
             raise typer.BadParameter(f"{given} needs {missing}, which is missing")
 
@@ -160,7 +163,7 @@ def changed(*groups: Any) -> Sequence[str]:
 
 
 def as_typed(*names: str) -> Sequence[str]:
-    """Options of these fields."""
+    """The options of fields with these names."""
     return [f"--{name.replace('_', '-')}" for name in names]
 
 

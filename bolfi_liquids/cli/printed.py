@@ -85,7 +85,7 @@ def print_findings(criticism: "Criticism") -> None:
     facts = criticism_facts(criticism)
     of_what_there_is = {"where": "where", "poured": "pours", "next": "suggestions"}
     parts = ("verdict", "baseline", "criticism", "gap", "where", "detectable", "poured", "next")
-    told = [part for part in parts if facts.get(of_what_there_is.get(part, part), True)]
+    told = [part for part in parts if part not in of_what_there_is or facts[of_what_there_is[part]]]
     _print_prose(told, {"criticism": facts})
 
 

@@ -38,7 +38,9 @@ class ArmOptions:
     emulator: Annotated[
         bool, typer.Option("--emulator", help="All of it with an emulated arm and cameras.")
     ] = False
-    viscosity: Annotated[float, typer.Option(help="Of the emulated liquid [Pa s].")] = 1.0
+    viscosity: Annotated[
+        float | None, typer.Option(help="Of the emulated liquid [Pa s]; else 1.")
+    ] = None
 
     def __post_init__(self) -> None:
         one_arm(self.arm, self.emulator)
@@ -49,8 +51,10 @@ class ArmOptions:
         """Who is asked and what is emulated, as `record` takes them."""
         from ..hardware import HiddenLiquid
 
-        liquid = HiddenLiquid(viscosity=self.viscosity) if self.emulator else False
-        return {"ask": typed_sentence if self.arm else None, "emulate": liquid}
+        emulate = (
+            self.emulator if self.viscosity is None else HiddenLiquid(viscosity=self.viscosity)
+        )
+        return {"ask": typed_sentence if self.arm else None, "emulate": emulate}
 
 
 @dataclass(frozen=True)
@@ -65,8 +69,12 @@ class OnlineOptions:
         Path | None, typer.Option(metavar="FILE", help="cups.toml of the pour, for --calibrate.")
     ] = None
     target: Annotated[
-        float, typer.Option(help="Spilled share at which stirring may end, for --calibrate.")
-    ] = OnlineSettings().target
+        float | None,
+        typer.Option(
+            help="Spilled share at which stirring may end, for --calibrate; "
+            f"else {OnlineSettings.target:g}."
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
         need(self, "calibrate", "cups", "target")
@@ -78,7 +86,7 @@ class OnlineOptions:
 
         if self.calibrate is None:
             return None
-        settings = OnlineSettings(target=self.target)
+        settings = OnlineSettings() if self.target is None else OnlineSettings(target=self.target)
         cycles = USUAL_CYCLES if cycles is None else cycles
         return OnlineChoice(self.calibrate, cups_of(self.cups), settings, cycles=cycles)
 

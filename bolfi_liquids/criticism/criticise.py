@@ -132,11 +132,11 @@ def _find(
         "seed": inputs.settings.seed,
         "level": inputs.level,
     }
-    sources = {"stirs": _stirs(calibration, inputs, clean, how | {"report": report})}
+    sources = Sources(_stirs(calibration, inputs, clean, how | {"report": report}))
     if inputs.table is not None:
         how["report"] = lambda phase, n: report(f"pours, {phase}", n)
-        known = calibration.prior, sources["stirs"]
-        sources["pours"] = _pours(*known, inputs, inputs.table, how)
+        pours = _pours(calibration.prior, sources.stirs, inputs, inputs.table, how)
+        sources = Sources(sources.stirs, pours)
     return sources, sum(one.simulations for one in clean)
 
 

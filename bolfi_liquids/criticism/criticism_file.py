@@ -15,12 +15,14 @@ Its groups, under `stirs` and, where pours were given, under `pours`:
 """
 
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..inputs.fields import PLANE_NAMES
+from ..inputs.pour_table import PourTable
+from ..simulators import StirSimulator
 from .inputs import Inputs
 from .pours import OUTCOMES
 
@@ -29,11 +31,19 @@ if TYPE_CHECKING:
 
     from .. import inference
 
-Sources = dict[str, "inference.criticism.Criticism"]
-"""What the engine concluded on `stirs` and, where some were given, on `pours`."""
+ANGLE, DIMENSIONLESS = {"units": "rad"}, {"units": "1"}
 
-UNITS = {"stirs": {"units": "rad"}, "pours": {"units": "1"}}
-DIMENSIONLESS = {"units": "1"}
+
+class Sources(NamedTuple):
+    """What the engine concluded on stirs and, where some were given, on pours."""
+
+    stirs: "inference.criticism.Criticism"
+    pours: "inference.criticism.Criticism | None" = None
+
+    @property
+    def given(self) -> "list[inference.criticism.Criticism]":
+        """Those that there are."""
+        return [source for source in self if source is not None]
 
 
 class EffectStatus(StrEnum):
@@ -54,20 +64,14 @@ def criticism_tree(inputs: Inputs, sources: Sources) -> "DataTree":
     """Everything that a report shows."""
     from xarray import DataTree
 
-    groups: dict[str, Any] = {"/posterior": _posterior(sources, inputs.settings.seed)}
-    for name, source in sources.items():
-        units = UNITS[name]
-        residual = _stirs_residual if name == "stirs" else _pours_residual
-        groups[f"/{name}/residual"] = residual(inputs, source)
-        groups[f"/{name}/where"] = _where(source, units)
-        groups[f"/{name}/effects"] = _effects(source)
-        groups[f"/{name}/confusion"] = _confusion(source)
-        if source.gaps:
-            groups[f"/{name}/held_out"] = _held_out(source, units)
-        if source.suggestions:
-            groups[f"/{name}/suggestions"] = _suggestions(source)
-    tree = DataTree.from_dict(groups)
-    accepted = [name for source in sources.values() for name in source.accepted]
+    groups = {"posterior": DataTree(_posterior(sources, inputs.settings.seed))}
+    residual = _stirs_residual(inputs.stirring, sources.stirs)
+    groups["stirs"] = _of_source(sources.stirs, residual, ANGLE)
+    if sources.pours is not None and inputs.table is not None:
+        residual = _pours_residual(inputs.table, sources.pours)
+        groups["pours"] = _of_source(sources.pours, residual, DIMENSIONLESS)
+    tree = DataTree(children=groups)
+    accepted = [name for source in sources.given for name in source.accepted]
     tree.attrs.update(
         accepted=accepted,
         requested=[name for name in accepted if name in (inputs.settings.accept or ())],
@@ -76,11 +80,30 @@ def criticism_tree(inputs: Inputs, sources: Sources) -> "DataTree":
     return tree
 
 
+def _of_source(
+    source: "inference.criticism.Criticism", residual: "Dataset", units: dict[str, str]
+) -> "DataTree":
+    """The groups of stirs or of pours, whose data have these units."""
+    from xarray import DataTree
+
+    groups = {
+        "residual": residual,
+        "where": _where(source, units),
+        "effects": _effects(source),
+        "confusion": _confusion(source),
+    }
+    if source.gaps:
+        groups["held_out"] = _held_out(source, units)
+    if source.suggestions:
+        groups["suggestions"] = _suggestions(source)
+    return DataTree.from_dict(groups)
+
+
 def last_models(sources: Sources) -> "list[inference.criticism.Hypothesis]":
-    """The last model that was extended, or else the stirs' base model; and the stirs' before it,
-    where it knows of effects that do not act in pours."""
-    stirs = sources["stirs"].extended or sources["stirs"].base.hypothesis
-    last = sources["pours"].extended if "pours" in sources else None
+    """The models that have all parameters: the pours' extended one, where there is one, and the
+    stirs' last one, unless the pours' has all of its effects."""
+    stirs = sources.stirs.extended or sources.stirs.base.hypothesis
+    last = sources.pours and sources.pours.extended
     if last is None:
         return [stirs]
     return [last] if set(stirs.names) <= set(last.fit.prior.names) else [last, stirs]
@@ -102,24 +125,22 @@ def _posterior(sources: Sources, seed: int) -> "Dataset":
     return known
 
 
-def _stirs_residual(inputs: Inputs, source: "inference.criticism.Criticism") -> "Dataset":
+def _stirs_residual(stirring: StirSimulator, source: "inference.criticism.Criticism") -> "Dataset":
     coords = {
-        "time": ("frame", inputs.stirring.time, {"units": "s"}),
-        "recording": ("frame", inputs.stirring.member),
+        "time": ("frame", stirring.time, {"units": "s"}),
+        "recording": ("frame", stirring.member),
         "plane": list(PLANE_NAMES),
     }
-    return _residual(source, ("frame", "plane"), UNITS["stirs"]).assign_coords(coords)
+    return _residual(source, ("frame", "plane"), ANGLE).assign_coords(coords)
 
 
-def _pours_residual(inputs: Inputs, source: "inference.criticism.Criticism") -> "Dataset":
-    table = inputs.table
-    assert table is not None
+def _pours_residual(table: PourTable, source: "inference.criticism.Criticism") -> "Dataset":
     coords = {
         "angular_velocity": ("pour", table.angular_velocity, {"units": "rad s-1"}),
         "distance": ("pour", table.distance, {"units": "m"}),
         "outcome": list(OUTCOMES),
     }
-    return _residual(source, ("outcome", "pour"), UNITS["pours"]).assign_coords(coords)
+    return _residual(source, ("outcome", "pour"), DIMENSIONLESS).assign_coords(coords)
 
 
 def _residual(
@@ -136,7 +157,7 @@ def _residual(
 
 
 def _left(hypothesis: "inference.criticism.Hypothesis") -> tuple[np.ndarray, np.ndarray]:
-    """Observed less expected, what is known to be usual included, and its sd."""
+    """Observed less expected, with the usual model error counted as expected, and its sd."""
     output = hypothesis.surrogate.output
     sd = np.sqrt(np.diag(hypothesis.spread + hypothesis.noise))
     return output.restore(hypothesis.difference[None])[0], output.restore(sd[None])[0]

@@ -297,10 +297,8 @@ class CriticismSummary(Section):
             tree: criticism.nc.
             seconds: Time that it took [s].
         """
-        posterior, verdicts = (
-            tree["posterior"].to_dataset(),
-            list(map(SourceVerdict.of, sources.values())),
-        )
+        posterior, given = tree["posterior"].to_dataset(), sources.given
+        verdicts = list(map(SourceVerdict.of, given))
         verdict, effects = _together(verdicts)
         accepted, requested = (tuple(tree.attrs[name]) for name in ("accepted", "requested"))
         return cls(
@@ -311,22 +309,22 @@ class CriticismSummary(Section):
             unsupported=unsupported(sources),
             refuted=tuple(name for one in verdicts for name in one.refuted),
             held_out=min(one.held_out for one in verdicts if one.verdict == verdict),
-            reason=" ".join(source.verdict.reason for source in sources.values()),
+            reason=" ".join(source.verdict.reason for source in given),
             p_value=min(1.0, len(verdicts) * min(one.p_value for one in verdicts)),
-            where=significant_windows(sources["stirs"]),
+            where=significant_windows(sources.stirs),
             coefficient={name: ParameterSummary.of(posterior[name]) for name in accepted},
             parameters={str(name): ParameterSummary.of(of) for name, of in posterior.items()},
             best=best_of(sources),
-            n_simulations=clean + sum(source.simulations for source in sources.values()),
-            gap=GapSummary.of(sources["stirs"]),
+            n_simulations=clean + sum(source.simulations for source in given),
+            gap=GapSummary.of(sources.stirs),
             stirs=verdicts[0],
-            pours=PourVerdict.of(sources["pours"]) if "pours" in sources else None,
+            pours=sources.pours and PourVerdict.of(sources.pours),
             suggestions=tuple(
                 SuggestedExperiment(one.label, tuple(one.between), one.snr)
-                for source in sources.values()
+                for source in given
                 for one in source.suggestions
             ),
-            untested=tuple(name for source in sources.values() for name in source.untested),
+            untested=tuple(name for source in given for name in source.untested),
             baseline=len(inputs.baseline),
             baseline_left_out=inputs.left_out,
             noise=CameraNoise.of(inputs.cameras),
@@ -354,7 +352,7 @@ def unsupported(sources: Sources) -> tuple[str, ...]:
     do."""
     return tuple(
         name
-        for source in sources.values()
+        for source in sources.given
         if source.leading is not None and not source.leading.accepted
         for name in source.accepted
     )

@@ -127,7 +127,7 @@ class OnlineCalibration:
             out: See the attribute.
             learn_pours: Learns the map of landings; it can be pickled.
             simulate: Simulates the plan; it can be pickled, without JAX.
-            resources: To be closed with it.
+            resources: To be closed with it; they are taken over unless it cannot begin.
         """
         self.settings, self.out = problem.settings, out
         (self.plan,) = problem.stirring.recordings
@@ -141,12 +141,14 @@ class OnlineCalibration:
         self._made: Made = ()
         self._simulating: Future[Made] | None = None
         self._no_more = ""  # why nothing is simulated any more
-        self._resources = resources
         thread = Thread(target=self._work, name="online calibration", daemon=True)
-        resources.callback(thread.join)
-        self._learner = resources.enter_context(background_process(LEARNER_NICENESS))
-        self._simulator = resources.enter_context(background_process(SIMULATOR_NICENESS))
-        thread.start()
+        with ExitStack() as processes:
+            self._learner = processes.enter_context(background_process(LEARNER_NICENESS))
+            self._simulator = processes.enter_context(background_process(SIMULATOR_NICENESS))
+            thread.start()
+            resources.callback(thread.join)
+            resources.push(processes.pop_all())  # closed first: the thread waits for them
+        self._resources = resources.pop_all()
 
     @classmethod
     def start(
@@ -200,7 +202,7 @@ class OnlineCalibration:
             # side by side: nothing else is urgent before the robot moves
             batch = max(settings.in_flight, os.cpu_count() or 1)
             simulate = partial(simulate_plan, problem.stirring, bank, batch)
-            return cls(problem, out, learn, simulate, resources.pop_all())
+            return cls(problem, out, learn, simulate, resources)
 
     def wait_until_ready(self, timeout: float | None = None) -> bool:
         """Wait until data may come, or preparation failed, or `timeout` [s] has passed.
@@ -284,17 +286,20 @@ class OnlineCalibration:
             self._prepared.set()
 
     def _is_closing(self) -> bool:
-        """Whether it is closed within `POLL_SECONDS`."""
+        """Wait `POLL_SECONDS`; whether it was closed meanwhile."""
         return self._closing.wait(POLL_SECONDS)
 
     def _prepare(self) -> None:
         """Learn the map of landings while the design is simulated."""
         self._simulate(self._learn(design, self._problem))
-        self._tell(detail="learning the map of landings")
-        self._map = self._learn(self._learn_pours)
-        self._tell(detail="simulating the plan")
-        while self._simulating is not None and not self._is_closing():
+        self._tell(detail="learning the map of landings, and simulating the plan")
+        learned = self._learner.submit(self._learn_pours)
+        while not (self._no_more or self._is_closing()):
             self._take_simulations()
+            if learned.done():
+                self._map = learned.result()
+                if self._simulating is None:
+                    break
         if self._no_more:
             self._fail(self._no_more)
         else:
@@ -349,6 +354,6 @@ class OnlineCalibration:
         self._tell(phase=OnlinePhase.FAILED, detail=why, in_flight=0)
 
     def _tell(self, **changes: Any) -> None:
-        """Change the status; what the end of the processes leads to is none."""
+        """Change the status, unless it is being closed: that its processes end is no failure."""
         if not self._closing.is_set():
             self.status = self.status._replace(**changes)

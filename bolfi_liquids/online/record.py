@@ -17,7 +17,7 @@ from .plan import PartialRecording
 
 if TYPE_CHECKING:
     from ..hardware import HiddenLiquid, Rig, Session
-    from ..hardware.motion import Trajectory
+    from ..hardware.motion import PosePath, Trajectory
     from .estimate import OnlineEstimate
 
 BAD_FIT = (
@@ -86,14 +86,15 @@ class _Learning:
     view: SessionView
     enough: bool = False
 
-    def wait(self, number: int) -> bool:
-        """Wait for a path's end, and hand over the data so far; whether the pour is known well
-        enough."""
+    def wait(self, number: int, path: "PosePath") -> bool:
+        """Wait for a path's end, and hand over the data so far after a stroke; whether the pour is
+        known well enough."""
         while not self.session.wait(number, timeout=0.05):
             self._take(self.calibration.poll())
-        time.sleep(FOLLOWED_AFTER)
-        if (so_far := _so_far(self.session.directory, time.monotonic())) is not None:
-            self._take(self.calibration.update(so_far))
+        if path.stirring:
+            time.sleep(FOLLOWED_AFTER)
+            if (so_far := _so_far(self.session.directory, time.monotonic())) is not None:
+                self._take(self.calibration.update(so_far))
         return self.enough
 
     def _take(self, estimate: "OnlineEstimate | None") -> None:

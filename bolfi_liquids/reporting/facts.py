@@ -245,8 +245,9 @@ def _coefficient(name: str, values: ParameterSummary) -> Facts:
     """How large an accepted effect is, and what it is."""
     from ..models import EFFECTS
 
-    neutral = with_unit(name, EFFECTS[name].neutral)
-    return {**_parameter(name, values), "text": EFFECTS[name].text, "neutral": neutral}
+    effect = EFFECTS.get(name)  # a user's own may not be registered in this process
+    known = {"text": effect.text, "neutral": with_unit(name, effect.neutral)} if effect else {}
+    return {"text": "", "neutral": "", **_parameter(name, values), **known}
 
 
 def _place(window: DifferingWindow) -> Facts:

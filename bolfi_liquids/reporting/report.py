@@ -1,6 +1,7 @@
 """report.html: one file that shows a run, without anything from outside it."""
 
 import json
+import logging
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from importlib.resources import files
@@ -24,7 +25,7 @@ from ..pouring.figures import pour_figure
 from ..run.compute import open_compute
 from ..run.run import REPORT, RUN_TOML, Run, RunOrPath
 from .facts import held_out_of
-from .films import films_of
+from .films import Film, films_of
 from .prose import prose, templates
 from .warnings import Results
 
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..inference.simulations import Workers
+
+logger = logging.getLogger(__name__)
 
 PAGE_TEMPLATE, STYLE = "report.html.jinja", "report.css"
 
@@ -64,16 +67,21 @@ def report(
     ):
         results = Results.of(opened)
         facts = results.facts
-        drawn = thread.submit(figures_of, results)  # while this thread, or workers, make films
-        latest, pour = results.latest, results.pour
-        films = films_of(latest, pour, compute, progress=progress) if moving else []
+        for notice in results.outdated:
+            logger.warning(notice)
+        given = results.latest, results.pour, compute
+        make_films = partial(films_of, *given, progress=progress) if moving else list[Film]
+        # workers make films while figures are drawn, which changes settings of this process
+        made = None if compute.executor is None else thread.submit(make_films)
+        figures = figures_of(results)
+        films = make_films() if made is None else made.result()
         page = (
             templates(autoescape=True)
             .get_template(PAGE_TEMPLATE)
             .render(
                 **facts,
                 prose=partial(prose, facts=facts),
-                figures=drawn.result(),
+                figures=figures,
                 films=[film for film in films if film.path.stat().st_size],  # else it diverged
                 made_from=_made_from(results),
                 style=(files("bolfi_liquids.data") / STYLE).read_text(encoding="utf-8"),

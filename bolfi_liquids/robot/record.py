@@ -18,6 +18,7 @@ from .stir import StirPlan, follow_plan, plan_stir, stir_task
 
 if TYPE_CHECKING:
     from ..hardware import Check, HiddenLiquid, Rig, Session
+    from ..hardware.motion import PosePath
 
 
 def record(
@@ -58,7 +59,7 @@ def record(
     with stirring(stir, title, progress) as (session, view):
         view.motions = 1 + len(stir.task.paths)
 
-        def wait(number: int) -> bool:
+        def wait(number: int, _: "PosePath") -> bool:
             view.until_done(session, number)
             return False
 

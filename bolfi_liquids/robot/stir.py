@@ -76,13 +76,15 @@ def stir_task(rig: "Rig", plan: StirPlan, out: Path) -> Task:
     return Task(rig, "stirring", plan.paths, out, cameras=True)
 
 
-def follow_plan(session: "Session", plan: StirPlan, wait: Callable[[int], bool]) -> None:
+def follow_plan(
+    session: "Session", plan: StirPlan, wait: Callable[[int, "PosePath"], bool]
+) -> None:
     """From where the arm is: to the cup, strokes until it is enough, and out again.
 
     Args:
         session: Which may move the arm.
         plan: What it will do.
-        wait: Waits for the end of a path; whether no further stroke is wanted.
+        wait: Waits for the end of a path, by its number; whether no further stroke is wanted.
 
     Raises:
         RigError: The pre-flight list has failures.
@@ -90,14 +92,14 @@ def follow_plan(session: "Session", plan: StirPlan, wait: Callable[[int], bool])
     """
     from ..hardware.motion import approach, retract
 
-    ordered, enough = list[int](), False
+    ordered, enough = list[tuple[int, "PosePath"]](), False
 
     def follow(path: "PosePath") -> None:
         nonlocal enough
-        ordered.append(session.follow(path))
+        ordered.append((session.follow(path), path))
         # all at once would be checked at once, which takes the cameras' time
         if len(ordered) > PATHS_AHEAD:
-            enough = wait(ordered[-1 - PATHS_AHEAD])
+            enough = wait(*ordered[-1 - PATHS_AHEAD])
 
     follow(approach(session.rig, session.pose()))
     follow(plan.insert)
@@ -109,8 +111,8 @@ def follow_plan(session: "Session", plan: StirPlan, wait: Callable[[int], bool])
             break
     else:
         follow(plan.retract)
-    for number in ordered[-PATHS_AHEAD:]:
-        wait(number)
+    for last in ordered[-PATHS_AHEAD:]:
+        wait(*last)
 
 
 def _still(rig: "Rig", pose: np.ndarray) -> "PosePath":

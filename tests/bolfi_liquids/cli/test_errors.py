@@ -33,6 +33,25 @@ def test_who_interrupts_is_told_to_resume_only_what_has_begun(tmp_path, monkeypa
     assert "--resume" not in _how_to_go_on(["pour", "run"])
 
 
+@pytest.mark.parametrize("out", [[], ["--out"], ["--out", "--budget"], ["--out", 300 * "n"]])
+def test_who_interrupts_without_a_place_is_told_to_begin_again(tmp_path, monkeypatch, out):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "run.toml").touch()  # of no run that was named
+    assert "begin again" in _how_to_go_on(["calibrate", "stir.nc", *out])
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "needed"),
+    [("--viscosity", "1", "--emulator"), ("--viscosity", "0", "--emulator")]
+    + [("--target", "0.05", "--calibrate"), ("--cups", "cups.toml", "--calibrate")],
+)
+def test_an_option_without_what_it_needs_is_refused_whatever_its_value(
+    option, value, needed, tmp_path
+):
+    result = CliRunner().invoke(app, ["record", "--out", str(tmp_path / "stir"), option, value])
+    assert result.exit_code == 2 and f"{option} needs {needed}" in result.stderr
+
+
 TYPED = {
     "calibrate": (["stir.nc", "--out", "r", "--budget", "1"], "--budget: 1;"),
     "simulate pour": (["--angular-velocity", "0"], "--angular-velocity: 0 deg/s;"),

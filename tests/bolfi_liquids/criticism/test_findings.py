@@ -8,7 +8,13 @@ import xarray as xr
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 
 from bolfi_liquids.criticism import criticism_file
-from bolfi_liquids.criticism.criticism_file import _effects, _posterior, best_of, criticism_tree
+from bolfi_liquids.criticism.criticism_file import (
+    Sources,
+    _effects,
+    _posterior,
+    best_of,
+    criticism_tree,
+)
 from bolfi_liquids.criticism.pour_noise import REPEATABILITY_SD, SIMULATOR_ERROR_SD, PourNoise
 from bolfi_liquids.criticism.summary import unsupported
 from bolfi_liquids.inputs.settings import CriticismSettings
@@ -32,10 +38,6 @@ def source(accepted, extended):
     return SimpleNamespace(**concluded, gaps={}, suggestions=())
 
 
-def findings(stirs, pours):
-    return {"stirs": stirs} if pours is None else {"stirs": stirs, "pours": pours}
-
-
 @pytest.fixture
 def attributes(monkeypatch):
     """(stirs, pours, accept) -> attributes of criticism.nc, whose tables stay empty."""
@@ -43,8 +45,9 @@ def attributes(monkeypatch):
         monkeypatch.setattr(criticism_file, table, lambda *_: xr.Dataset())
 
     def attributes(stirs, pours, accept=None):
-        inputs = SimpleNamespace(settings=CriticismSettings(accept=accept), density=1000.0)
-        return criticism_tree(inputs, findings(stirs, pours)).attrs
+        settings = CriticismSettings(accept=accept)
+        inputs = SimpleNamespace(settings=settings, density=1000.0, stirring=None, table=pours)
+        return criticism_tree(inputs, Sources(stirs, pours)).attrs
 
     return attributes
 
@@ -76,7 +79,7 @@ NOTHING = source((), None)
 def test_the_last_model_says_what_it_knows_and_the_stirs_the_rest(
     attributes, stirs, pours, expected
 ):
-    together = findings(stirs, pours)
+    together = Sources(stirs, pours)
     assert best_of(together) == expected
     posterior = _posterior(together, 0)
     assert {name: float(values.mean()) for name, values in posterior.items()} == expected
@@ -93,7 +96,7 @@ def test_what_was_requested_is_told_from_what_was_found(attributes):
 def test_what_is_accepted_though_it_explains_nothing_is_told(explains, expected):
     stirs = source(("camera_delay",), model(("camera_delay",), 1.0))
     stirs.leading = SimpleNamespace(accepted=explains)
-    assert unsupported(findings(stirs, None)) == expected
+    assert unsupported(Sources(stirs)) == expected
 
 
 def candidate(name, **changes):

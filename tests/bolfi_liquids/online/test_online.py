@@ -5,7 +5,9 @@ import os
 import signal
 import sqlite3
 import time
+from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from multiprocessing import active_children
 from types import SimpleNamespace
 
@@ -14,10 +16,14 @@ import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids import models
+from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.online import online
+from bolfi_liquids.online.estimate import Problem
 from bolfi_liquids.online.online import OnlineCalibration, OnlineChoice, OnlinePhase
 from bolfi_liquids.online.plan import PartialRecording
 from bolfi_liquids.online.settings import OnlineSettings
+from bolfi_liquids.run.lock import alone_in
+from bolfi_liquids.simulators import stir_simulator
 
 # the process that simulates gives way to others: beside another test it gets little
 PATIENCE_S = 600
@@ -199,6 +205,31 @@ def test_death_is_a_status_and_disturbs_nobody(story):
     assert story.after is None
     running = {child.pid for child in active_children()}
     assert not running & {story.learner.pid, story.simulator.pid}
+
+
+def test_a_run_is_free_again_where_nothing_could_begin(short_recording, tmp_path, monkeypatch):
+    def refused(niceness):
+        raise OSError("no process")
+
+    recording = bl.open_recording(short_recording)
+    monkeypatch.setattr(online, "background_process", refused)
+    with pytest.raises(OSError, match="no process"):
+        start(recording, tmp_path, SMALL)
+    with alone_in(tmp_path):
+        pass
+
+
+@pytest.mark.slow
+def test_a_plan_that_cannot_be_simulated_is_told_before_the_map_is_learned(
+    short_recording, tmp_path
+):
+    plan = bl.open_recording(short_recording)
+    problem = Problem(default_prior(), stir_simulator([plan], SMALL.particles), SMALL)
+    long, refuse = partial(time.sleep, 2 * PATIENCE_S), int  # of a list of jobs: a TypeError
+    with OnlineCalibration(problem, tmp_path, long, refuse, ExitStack()) as of:
+        assert not of.wait_until_ready(PATIENCE_S)
+        assert of.status.phase is OnlinePhase.FAILED
+        assert "cannot be simulated" in of.status.detail
 
 
 @pytest.mark.slow

@@ -217,6 +217,21 @@ def test_the_command_line_says_what_the_report_says(printed, said):
         assert all(paragraph in text for paragraph in said(part)), part
 
 
+def test_the_command_line_says_what_was_not_there(printed, said, made):
+    tree = made()
+    tree["stirs/effects"]["snr"][:] = 0.1
+    told = printed(tree, baseline=0)
+    assert "(--baseline)" in told
+    (paragraph,) = said("detectable", tree)
+    assert paragraph in " ".join(told.split())
+
+
+def test_an_effect_that_this_process_does_not_know_has_its_size_alone(said, made):
+    own = {"my_effect": ParameterSummary(mean=2.0, sd=0.1, q05=1.8, q50=2.0, q95=2.2)}
+    (coefficient, *_) = said("criticism", coefficient=own)
+    assert "between 1.8 and 2.2" in coefficient and "no effect" not in coefficient
+
+
 @pytest.mark.parametrize(("changes", "told"), [(TIED, True), (REFUTED, True), ({}, False)])
 def test_effects_that_gain_are_named_where_nothing_else_is(said, made, changes, told):
     *_, last = said("detectable", made(status=["rejected: explains nothing"] * 3), **changes)

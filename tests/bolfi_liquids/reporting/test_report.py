@@ -7,6 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from html.parser import HTMLParser
 from multiprocessing import get_context
+from threading import get_ident
 
 import pytest
 import xarray as xr
@@ -18,6 +19,7 @@ from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.cli.printed import print_pour
 from bolfi_liquids.reporting import films as making
+from bolfi_liquids.reporting import report
 from bolfi_liquids.reporting.facts import calibration_facts, criticism_facts, fit_facts, pour_facts
 from bolfi_liquids.reporting.films import films_of
 from bolfi_liquids.reporting.prose import prose
@@ -212,13 +214,29 @@ def test_a_forced_pour_is_said_in_the_headline(pour, tmp_path, with_numbers):
     assert "--force" in headline(run)
 
 
-def test_a_result_that_does_not_count_is_warned_of(pour, tmp_path):
+def test_a_result_that_does_not_count_is_warned_of(pour, tmp_path, caplog):
     """The page is whole without it: no error."""
     run = shutil.copytree(pour.path, tmp_path / "run")
     (run / "pour.nc").write_bytes(b"damaged")
     result = CliRunner().invoke(app, ["report", str(run), "--still"])
     assert (result.exit_code, result.stdout.strip()) == (0, str(run / "report.html"))
-    assert "pour.nc is damaged; make it again: bolfi-liquids pour" in result.stderr
+    assert result.stderr.count("pour.nc is damaged; make it again: bolfi-liquids pour") == 1
+    caplog.clear()
+    bl.report(run, moving=False)
+    assert "pour.nc is damaged" in caplog.text
+
+
+def test_figures_are_drawn_where_the_report_was_called(pour, films, monkeypatch):
+    """Their style is a setting of the whole process."""
+    drawing, draw = [], report.figures_of
+
+    def drawn(results):
+        drawing.append(get_ident())
+        return draw(results)
+
+    monkeypatch.setattr(report, "figures_of", drawn)
+    bl.report(pour.path, progress=False)
+    assert drawing == [get_ident()]
 
 
 @pytest.mark.parametrize(

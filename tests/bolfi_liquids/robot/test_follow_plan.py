@@ -1,9 +1,12 @@
 """The order in which the paths of a stir are followed and awaited."""
 
+from types import SimpleNamespace
+
 import numpy as np
 from bolfi_liquids.hardware import bundled_rig
 from bolfi_liquids.hardware.motion import above_cup
 
+from bolfi_liquids.online import record
 from bolfi_liquids.robot.stir import PATHS_AHEAD, follow_plan, plan_stir
 
 RIG = bundled_rig()
@@ -26,7 +29,8 @@ class Session:
         self.ordered.append(path)
         return len(self.ordered) - 1
 
-    def wait(self, number):
+    def wait(self, number, path):
+        assert path is self.ordered[number]
         assert number == len(self.awaited)
         self.awaited.append(number)
         return False
@@ -42,8 +46,8 @@ def test_a_plan_is_followed_to_its_end():
 def test_a_stir_that_is_enough_ends_with_a_rest_and_leaves_the_cup_from_there():
     session, strokes = Session(), list(PLAN.strokes)
 
-    def enough_after_three(number):
-        session.wait(number)
+    def enough_after_three(number, path):
+        session.wait(number, path)
         return number >= 4  # the way to the cup, into it, and three strokes
 
     follow_plan(session, PLAN, enough_after_three)
@@ -61,9 +65,25 @@ def test_a_stir_that_is_enough_ends_with_a_rest_and_leaves_the_cup_from_there():
 def test_what_is_enough_at_the_last_stroke_changes_nothing():
     session = Session()
 
-    def enough(number):
-        session.wait(number)
+    def enough(number, path):
+        session.wait(number, path)
         return number >= len(PLAN.strokes) - 1
 
     follow_plan(session, PLAN, enough)
     assert session.ordered[1:] == list(PLAN.paths)
+
+
+def test_data_are_handed_over_after_strokes_alone(monkeypatch):
+    class Done(Session):
+        directory = None
+
+        def wait(self, number, timeout):
+            return not super().wait(number, self.ordered[number])
+
+    handed, session = [], Done()
+    monkeypatch.setattr(record, "FOLLOWED_AFTER", 0.0)
+    monkeypatch.setattr(record, "_so_far", lambda *_: len(session.ordered))
+    calibration = SimpleNamespace(update=handed.append, status=SimpleNamespace(detail=""))
+    view = SimpleNamespace(show=lambda _: None)
+    follow_plan(session, PLAN, record._Learning(session, calibration, view).wait)
+    assert len(handed) == len(PLAN.strokes)
