@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from bolfi_liquids.hardware.emulated.arm import PROGRAM_STOP_RATE
 from bolfi_liquids.hardware.emulated.motion import KinematicArm
 
 from .registers import Registers
@@ -114,7 +113,7 @@ class Program:
 
     def _servo_stop(self) -> None:
         self._set_point, self._stopping = [], True
-        self._arm.stop(PROGRAM_STOP_RATE)
+        self._arm.stop(self._numbers(1)[0])
 
     def _set_payload(self) -> None:
         mass, *centre = self._numbers(4)
