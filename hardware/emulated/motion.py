@@ -39,6 +39,8 @@ class KinematicArm:
         state: Joints and their speeds.
         pose: Of the TCP in the base frame [m, rad].
         velocity: Of the TCP [m/s, rad/s].
+        lookahead: Of `servo` [s].
+        gain: Of `servo` [1/s2].
     """
 
     def __init__(self, model: DhArm, joints: np.ndarray, tcp: np.ndarray):
@@ -46,25 +48,20 @@ class KinematicArm:
         self.state = JointState(np.array(joints, dtype=float), REST)
         self._servo: Callable[[JointState, float], JointState] | None = None
         self._deceleration = 0.0  # m/s2 and rad/s2; positive while the arm comes to rest
-        self.mount(tcp)
+        self.tcp = np.array(tcp, dtype=float)
+        self.lookahead, self.gain = LOOKAHEAD, SERVO_GAIN
+        self._look()
 
     @property
     def resting(self) -> bool:
         """Whether no joint moves."""
         return max(map(abs, self.state.speed.tolist())) < RESTING_RATE
 
-    def mount(self, tcp: np.ndarray) -> None:
-        """Set the TCP's pose in the flange's frame."""
-        self.tcp = np.array(tcp, dtype=float)
-        self._look()
-
     def reaches(self, pose: np.ndarray) -> bool:
         """Whether the arm reaches a pose at all."""
         return inverse(self.model, pose, self.state.joints, tcp=self.tcp) is not None
 
-    def follow(
-        self, pose: np.ndarray, lookahead: float = LOOKAHEAD, gain: float = SERVO_GAIN
-    ) -> None:
+    def follow(self, pose: np.ndarray) -> None:
         """Be drawn to a pose from now on, as `servo` says.
 
         Raises:
@@ -77,8 +74,8 @@ class KinematicArm:
         self._servo = partial(
             servo,
             target=found,
-            lookahead=lookahead,
-            gain=gain,
+            lookahead=self.lookahead,
+            gain=self.gain,
             fastest=np.array(self.model.joint_speed),
         )
 

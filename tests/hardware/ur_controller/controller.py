@@ -157,6 +157,10 @@ class Controller:
     def set_payload(self, mass: float, centre: tuple[float, ...]) -> None:
         self.payload = (mass, centre)
 
+    def mount(self, tcp: np.ndarray) -> None:
+        """Give the arm, at rest, another tool's centre in the flange's frame."""
+        self.arm = KinematicArm(self.arm.model, self.arm.state.joints, tcp)
+
     def skip(self, ticks: int) -> None:
         """Let the clock go on by ticks that the computer had no time for."""
         self._ticks += ticks

@@ -108,8 +108,8 @@ class Program:
         numbers = self._numbers(11)
         if numbers != self._set_point:
             self._set_point = numbers
-            *pose, _, _, _, lookahead, gain = numbers
-            self._arm.follow(np.array(pose), lookahead, gain)
+            *pose, _, _, _, self._arm.lookahead, self._arm.gain = numbers
+            self._arm.follow(np.array(pose))
 
     def _servo_stop(self) -> None:
         self._set_point, self._stopping = [], True
@@ -123,7 +123,7 @@ class Program:
         offset = self._pose()
         if not np.isfinite(offset).all():
             raise ProgramError(f"TCP offset {offset.tolist()} is not finite")
-        self._arm.mount(offset)
+        self._machine.mount(offset)
 
     @property
     def _arm(self) -> KinematicArm:
