@@ -75,8 +75,7 @@ class EmulatedArm:
         self._check = TargetCheck(rig, tool)
         self._clock, self._begun = controller.clock, controller.begun
         self._world = controller.world
-        self._stir = controller.stir
-        self._stick = None if self._stir is None else stick.init(self._stir)
+        self._stick = None if controller.stir is None else stick.init(controller.stir)
         self._arm = KinematicArm(space.arm, np.array(controller.joints), space.tcp)
         self._payload = Payload(0.0, (0.0, 0.0, 0.0))
         self._noise = random.Random(controller.seed)
@@ -193,9 +192,9 @@ class EmulatedArm:
         except MotionError:
             self._protect()
         self._wrench = self._force()
-        if self._stir is not None and self._stick is not None:
+        if self._stick is not None:
             pivot = self._frame.from_base(self._arm.pose)[:3]
-            self._stick = stick.advance(self._stir, self._stick, pivot, self._dt)
+            self._stick = stick.advance(self._stick, pivot, self._dt)
         self._show()
 
     def _show(self) -> None:
@@ -204,9 +203,7 @@ class EmulatedArm:
             return
         time = self._ticks * self._dt
         pivot = self._frame.from_base(self._arm.pose)[:3]
-        inclination = np.zeros(2)
-        if self._stir is not None and self._stick is not None:
-            inclination = np.array(stick.angles(self._stir, self._stick))
+        inclination = np.zeros(2) if self._stick is None else np.array(stick.angles(self._stick))
         self._world.write(self._begun + time, WorldState(time, pivot, inclination))
 
     def _protect(self) -> None:

@@ -136,9 +136,7 @@ def servo(
     return JointState(joints, speed)
 
 
-def braked(
-    state: JointState, velocity: np.ndarray, dt: float, deceleration: float
-) -> JointState:
+def braked(state: JointState, velocity: np.ndarray, dt: float, deceleration: float) -> JointState:
     """One tick in which all joints slow down together, and the TCP as a real arm's in `stopl`.
 
     Args:
