@@ -60,7 +60,7 @@ def test_the_bundled_rig_can_be_used():
         ("[cup]", 'driver = "ur"\n[cup]', "robot.driver", "known: host, controller, rate"),
         ("[cup]", "zzz = 1\n[cup]", "robot.zzz", "known: host, controller, rate"),
         ("[robot]", "zzz = 1\n[robot]", "zzz", "known: robot, cup, stick"),
-        ('view = "xz"', 'view = "xz"\nfocal = 8.0', "cameras.0.focal", "mean focal_length?"),
+        ('view = "xz"', 'view = "xz"\nrates = 30.0', "cameras.0.rates", "mean rate\\?"),
         ('host = "127.0.0.1" ', "", "robot.host", "required"),
         ("x = [-0.05, 0.05]", "x = [0.05, -0.05]", "limits.stirring", "x must ascend"),
         ("force = 20.0", "force = 0.0", "limits.force", "0 N is not within 1 to"),
