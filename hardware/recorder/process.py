@@ -7,8 +7,8 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
 from ..board import Board, Row, Who, host_time
+from ..csv_file import CsvAppender
 from ..signals import leave_signals_to_main
-from .csv_file import CsvAppender
 from .disk import Disk, told_if_fails
 from .events import EventLog
 from .rate import counted, no_rate

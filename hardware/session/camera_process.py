@@ -13,8 +13,8 @@ import numpy as np
 
 from ..board import Board, Row, Trouble, Who, host_time
 from ..cameras.base import CameraError, FrameSource
+from ..csv_file import CsvAppender
 from ..priority import come_first
-from ..recorder.csv_file import CsvAppender
 from ..recorder.disk import Disk, told_if_fails
 from ..recorder.events import EventLog
 from ..recorder.names import frames_file, video_file
