@@ -20,7 +20,7 @@ REST = np.zeros(6)
 
 
 class MotionError(Exception):
-    """The arm cannot do what it was told; the controller answers with a protective stop."""
+    """The arm cannot make a motion; the controller answers with a protective stop."""
 
 
 class JointState(NamedTuple):

@@ -52,7 +52,7 @@ def run_recorder(board: Board, samples: Connection, main: Connection, directory:
 
 
 def _arriving(samples: Connection, main: Connection, disk: Disk) -> Iterator[list[Sample]]:
-    """What comes within each heartbeat, until main lets go and the arm has sent its last sample."""
+    """Yield each heartbeat's samples, until main lets go and the arm has sent its last one."""
     ends = [samples, main]
     deadline = float("inf")
     while host_time() < deadline and ends:
