@@ -118,9 +118,8 @@ def servo(
     """One tick in which joints are drawn by gain * (target - joints - lookahead * speed).
 
     As in the manual, the arm lags a moving target by `lookahead` [s]: a smaller one reacts faster,
-    a larger one overshoots less; `gain` [1/s2] stiffens.
-    The real filter is not published. Speeds are clipped to `fastest` [rad/s], accelerations to
-    `SERVO_RATE`.
+    a larger one overshoots less; `gain` [1/s2] stiffens. The real filter is not published. Speeds
+    are clipped to `fastest` [rad/s], accelerations to `SERVO_RATE`.
     """
     stay, push, swing, keep = oscillator(gain, gain * lookahead, dt)
     away = state.joints - target
@@ -137,13 +136,13 @@ def servo(
 
 
 def braked(state: JointState, velocity: np.ndarray, dt: float, deceleration: float) -> JointState:
-    """One tick in which all joints slow down together, and the TCP as a real arm's in `stopl`.
+    """One tick in which all joints slow down together, so that the TCP loses deceleration * dt.
 
     Args:
         state: Joints and their speeds, before the tick.
         velocity: Of the TCP [m/s, rad/s].
         dt: Of the tick [s].
-        deceleration: Of the TCP [m/s2] and of its turn [rad/s2]; the longer stop of both counts.
+        deceleration: Of the TCP [m/s2] and of its turn [rad/s2]; the longer of both stops counts.
     """
     fastest = max(math.hypot(*velocity[:3]), math.hypot(*velocity[3:]))
     share = 1.0 - deceleration * dt / fastest if fastest > 0.0 else 0.0
