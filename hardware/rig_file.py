@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from difflib import get_close_matches
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import ValidationError
 
@@ -74,16 +74,26 @@ def _refusal(faults: list[RigFault], where: str) -> RigError:
 
 def _faults(err: ValidationError) -> Iterator[RigFault]:
     """Missing and unknown fields, wrong types, numbers beyond their ends."""
-    known = {name for section in RigSection.__subclasses__() for name in section.model_fields}
     for one in err.errors(include_url=False, include_context=False):
         name, given = ".".join(map(str, one["loc"])), one["input"]
         what = one["msg"].removeprefix("Value error, ")
         if one["type"] == "extra_forbidden":
-            likely = get_close_matches(str(one["loc"][-1]), known, n=1)
-            what = f"no such field (did you mean {likely[0]}?)" if likely else "no such field"
+            *way, unknown = one["loc"]
+            known = _section(way).model_fields
+            likely = get_close_matches(str(unknown), known, n=1)
+            hint = f"did you mean {likely[0]}?" if likely else f"known: {', '.join(known)}"
+            what = f"no such field ({hint})"
         elif one["type"] != "value_error" and not isinstance(given, dict):
             what = f"{what}, got {given!r:.60}"
         yield RigFault(name, what)
+
+
+def _section(way: list[int | str]) -> type[RigSection]:
+    """The part of a rig to which names of fields, and indices into tuples, lead."""
+    kind: Any = Rig
+    for step in way:
+        kind = get_args(kind)[step] if isinstance(step, int) else kind.model_fields[step].annotation
+    return kind
 
 
 def _beside(rig: Rig, directory: Path) -> Rig:

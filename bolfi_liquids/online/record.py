@@ -10,7 +10,7 @@ import numpy as np
 from ..inputs.recording import Recording
 from ..robot.armed_session import Ask
 from ..robot.live_view import SessionView
-from ..robot.record import finished, prepared, stirring
+from ..robot.record import finished, prepare_stir, stir_session
 from ..robot.stir import StirPlan, follow_plan
 from .online import OnlineCalibration, OnlineChoice, OnlinePhase
 from .plan import PartialRecording
@@ -65,12 +65,12 @@ def record_online(
     """
     from ..hardware.recorder.finalise import rig_attributes
 
-    stir = prepared(rig, out, ask, emulate, online.cycles)
+    stir = prepare_stir(rig, out, ask, emulate, online.cycles)
     path, attrs = _simulated(stir.plan), rig_attributes(stir.task.rig)
     with OnlineCalibration.start(path, attrs, online, progress=progress) as calibration:
         if not calibration.wait_until_ready():
             raise RuntimeError(f"the calibration is not ready: {calibration.status.detail}")
-        with stirring(stir, "stirring and calibrating", progress) as (session, view):
+        with stir_session(stir, "stirring and calibrating", progress) as (session, view):
             follow_plan(session, stir.plan, _Learning(session, calibration, view).wait)
         recording = finished(stir.task.out)
         calibration.finish(recording, progress=progress)

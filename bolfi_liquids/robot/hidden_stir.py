@@ -3,6 +3,8 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..errors import InputError
 from ..inputs.described_liquid import COHESION
 from ..inputs.recording import planned_recording
@@ -25,7 +27,7 @@ def with_stir(rig: "Rig", plan: StirPlan, liquid: "HiddenLiquid") -> "HiddenLiqu
         liquid: Of which a viscosity is known; one that has a stir keeps it.
 
     Raises:
-        InputError: The simulation of the stir goes wrong.
+        InputError: The liquid cannot be simulated, or its stir goes wrong.
         ValueError: The rig cannot be simulated.
     """
     from ..hardware import StickMotion, servoed
@@ -38,9 +40,13 @@ def with_stir(rig: "Rig", plan: StirPlan, liquid: "HiddenLiquid") -> "HiddenLiqu
     path = servoed(joined(list(plan.strokes)))
     expected = planned_recording(path.time, path.position, rig_attributes(rig))
     of = {"viscosity": liquid.viscosity, "cohesion": COHESION, "density": rig.liquid.density}
-    batch = batch_of(of, {}, 0, liquid.seed)
     try:
+        batch = batch_of(of, {}, 0, liquid.seed)
         (inclination,) = simulated(stir_simulator([expected], 0), batch, Compute())
+        if not np.isfinite(inclination).all():
+            raise RuntimeError("its result is not finite")
+    except InputError as err:
+        raise InputError(err.what, where=f"emulated {err.where}", fix=err.fix) from err
     except RuntimeError as err:
         raise InputError(
             f"{liquid.viscosity:g} Pa s cannot be stirred along the rig's path: {err}",

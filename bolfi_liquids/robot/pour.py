@@ -22,6 +22,7 @@ from .live_view import SessionView
 
 if TYPE_CHECKING:
     from ..hardware import Check, HiddenLiquid, Rig
+    from ..hardware.motion import PosePath
 
 logger = logging.getLogger(__name__)
 
@@ -123,12 +124,11 @@ def _check_ranges(run: Run, chosen: Judged, cups: "Cups") -> None:
             )
 
 
-def plan_pour(chosen: ChosenPour, rig: "Rig") -> Task:
-    """The motion of a pour: down, the turn, back upright and up again; it will be recorded in a new
-    directory of the run.
+def plan_pour(chosen: ChosenPour, rig: "Rig") -> "PosePath":
+    """The motion of a pour: down, the turn, back upright and up again.
 
     Raises:
-        InputError: Its receiver stands in the cup that is stirred.
+        InputError: The pour's receiver stands in the cup that is stirred.
         MotionRejected: The motion breaks one of the rig's limits.
     """
     from ..hardware import check_path
@@ -148,6 +148,11 @@ def plan_pour(chosen: ChosenPour, rig: "Rig") -> Task:
         **chosen.place,
     )
     check_path(path, rig, "pouring")
+    return path
+
+
+def pour_task(chosen: ChosenPour, rig: "Rig", path: "PosePath") -> Task:
+    """The motion for a session, recorded in a new directory of the run."""
     out = _next_directory(chosen.run.path)
     return Task(rig, "pouring", [path], out, about=str(chosen))
 
@@ -188,7 +193,7 @@ def execute_pour(
     rig = rig_of(rig)
     with Run.entered(run) as opened:
         chosen = chosen_pour(opened)
-        task = plan_pour(chosen, rig)
+        path = plan_pour(chosen, rig)
         if isinstance(run, Pour):
             run.check_current(opened)
         if ask is not None:
@@ -197,7 +202,7 @@ def execute_pour(
             if chosen.fit_is_bad:
                 logger.warning(BAD_FIT)
             logger.info(chosen.expected)
-        return _carried_out(chosen, task, ask, progress)
+        return _carried_out(chosen, pour_task(chosen, rig, path), ask, progress)
 
 
 def _carried_out(chosen: ChosenPour, task: Task, ask: Ask | None, progress: bool) -> Path:
@@ -226,7 +231,8 @@ def dry_pour(run: RunOrPath, rig: "Rig") -> "tuple[str, list[Check]]":
     Raises:
         InputError, MotionRejected: As `chosen_pour` and `plan_pour`.
     """
-    return dry_run(plan_pour(chosen_pour(Run.open(run)), rig))
+    chosen = chosen_pour(Run.open(run))
+    return dry_run(pour_task(chosen, rig, plan_pour(chosen, rig)))
 
 
 def _next_directory(run: Path) -> Path:

@@ -54,9 +54,9 @@ def record(
         MotionRejected: The plan breaks one of the rig's limits.
         SessionStopped: The arm was stopped; the message says why.
     """
-    stir = prepared(rig, out, ask, emulate, cycles)
+    stir = prepare_stir(rig, out, ask, emulate, cycles)
     title = "stirring" if ask else "stirring, emulated"
-    with stirring(stir, title, progress) as (session, view):
+    with stir_session(stir, title, progress) as (session, view):
         view.motions = 1 + len(stir.task.paths)
 
         def wait(number: int, _: "PosePath") -> bool:
@@ -67,7 +67,7 @@ def record(
     return finished(stir.task.out)
 
 
-class Stir(NamedTuple):
+class PlannedStir(NamedTuple):
     """A stir that is planned and checked, and may be carried out.
 
     Attributes:
@@ -82,13 +82,13 @@ class Stir(NamedTuple):
     by: "Ask | HiddenLiquid"
 
 
-def prepared(
+def prepare_stir(
     rig: "Rig | str | Path | None",
     out: str | Path,
     ask: Ask | None,
     emulate: "HiddenLiquid | bool",
     cycles: int | None,
-) -> Stir:
+) -> PlannedStir:
     """Check and plan a stir; the arguments and errors of `record`."""
     check_consent(ask, emulate, "record")
     opened, hidden = rig_of(rig), hidden_liquid(emulate)
@@ -96,11 +96,13 @@ def prepared(
     check_new(directory)
     by = ask if hidden is None else with_stir(opened, plan, hidden)
     assert by is not None
-    return Stir(plan, stir_task(opened, plan, directory), by)
+    return PlannedStir(plan, stir_task(opened, plan, directory), by)
 
 
 @contextmanager
-def stirring(stir: Stir, title: str, progress: bool) -> "Iterator[tuple[Session, SessionView]]":
+def stir_session(
+    stir: PlannedStir, title: str, progress: bool
+) -> "Iterator[tuple[Session, SessionView]]":
     """A session that may move the arm, and its view; what it records is kept whatever stops it.
 
     Raises:

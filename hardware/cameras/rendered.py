@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..csv_file import CsvAppender
 from ..host_clock import REAL_CLOCK, HostClock
-from ..recorder.csv_file import CsvAppender
 from ..rendering.drawing import Stage, exposure_times, render
 from ..rendering.world import World
 from ..vision.frame import Frame

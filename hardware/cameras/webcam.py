@@ -24,7 +24,7 @@ class Webcam:
         Args:
             source: Number of the device, or its path.
             size: Width and height of the pictures [px].
-            rate: Of them [1/s].
+            rate: Pictures per second.
 
         Raises:
             CameraError: it cannot be opened, gives no picture, or gives another size.

@@ -10,14 +10,14 @@ from ..host_clock import REAL_CLOCK, HostClock
 from ..motion.cup_frame import cup_frame
 from ..rendering.world import SharedWorld, WorldState
 from ..rig import Rig
+from ..robot.ur import STOP_DECELERATION
 from ..safety.guards import NORMAL, PLAYING, RUNNING_MODE
 from ..safety.limits import TargetCheck, workspace
 from . import replayed_stick as stick
 from .motion import KinematicArm, MotionError
 from .stick_motion import StickMotion
 
-PROGRAM_STOP_RATE = 5.0  # rad/s2; of the joints when a program ends in motion, or is told to stop
-PROTECTIVE_STOP_RATE = 15.0  # rad/s2
+PROTECTIVE_STOP = 10.0  # m/s2 and rad/s2
 STOPPED = 1  # runtime_state without a program
 PROTECTIVE_BITS = 1 << 2 | 1 << 10  # protective stopped; stopped due to safety
 FORCE_NOISE = (0.2, 0.2, 0.2, 0.02, 0.02, 0.02)  # N and Nm, standard deviation
@@ -75,8 +75,7 @@ class EmulatedArm:
         self._check = TargetCheck(rig, tool)
         self._clock, self._begun = controller.clock, controller.begun
         self._world = controller.world
-        self._stir = controller.stir
-        self._stick = None if self._stir is None else stick.init(self._stir)
+        self._stick = None if controller.stir is None else stick.init(controller.stir)
         self._arm = KinematicArm(space.arm, np.array(controller.joints), space.tcp)
         self._payload = Payload(0.0, (0.0, 0.0, 0.0))
         self._noise = random.Random(controller.seed)
@@ -161,7 +160,7 @@ class EmulatedArm:
         """Bring the arm to rest; it takes no further command."""
         self._go_on()
         if self._playing:
-            self._end_program(PROGRAM_STOP_RATE)
+            self._end_program(STOP_DECELERATION)
         self._stopped = True
 
     def give_up(self) -> None:
@@ -187,15 +186,15 @@ class EmulatedArm:
         self._ticks += 1
         silent = (self._ticks - self._fed) * self._dt
         if self._playing and self._guarded and silent > WATCHDOG_PERIOD + 0.5 * self._dt:
-            self._end_program(PROGRAM_STOP_RATE)
+            self._end_program(STOP_DECELERATION)
         try:
             self._arm.tick(self._dt)
         except MotionError:
             self._protect()
         self._wrench = self._force()
-        if self._stir is not None and self._stick is not None:
+        if self._stick is not None:
             pivot = self._frame.from_base(self._arm.pose)[:3]
-            self._stick = stick.advance(self._stir, self._stick, pivot, self._dt)
+            self._stick = stick.advance(self._stick, pivot, self._dt)
         self._show()
 
     def _show(self) -> None:
@@ -204,19 +203,17 @@ class EmulatedArm:
             return
         time = self._ticks * self._dt
         pivot = self._frame.from_base(self._arm.pose)[:3]
-        inclination = np.zeros(2)
-        if self._stir is not None and self._stick is not None:
-            inclination = np.array(stick.angles(self._stir, self._stick))
+        inclination = np.zeros(2) if self._stick is None else np.array(stick.angles(self._stick))
         self._world.write(self._begun + time, WorldState(time, pivot, inclination))
 
     def _protect(self) -> None:
         self._protective = True
-        self._end_program(PROTECTIVE_STOP_RATE)
+        self._end_program(PROTECTIVE_STOP)
 
-    def _end_program(self, rate: float) -> None:
-        """Take no further set-point; the joints come to rest at a rate [rad/s2]."""
+    def _end_program(self, deceleration: float) -> None:
+        """Take no further set-point; the arm comes to rest."""
         self._playing = False
-        self._arm.stop(rate)
+        self._arm.stop(deceleration)
 
     def _force(self) -> Six:
         """Noise alone: nothing presses."""

@@ -20,7 +20,7 @@ REST = np.zeros(6)
 
 
 class MotionError(Exception):
-    """The arm cannot do what it was told; the controller answers with a protective stop."""
+    """The arm cannot make a motion; the controller answers with a protective stop."""
 
 
 class JointState(NamedTuple):
@@ -39,32 +39,29 @@ class KinematicArm:
         state: Joints and their speeds.
         pose: Of the TCP in the base frame [m, rad].
         velocity: Of the TCP [m/s, rad/s].
+        lookahead: Of `servo` [s].
+        gain: Of `servo` [1/s2].
     """
 
     def __init__(self, model: DhArm, joints: np.ndarray, tcp: np.ndarray):
         self.model = model
         self.state = JointState(np.array(joints, dtype=float), REST)
         self._servo: Callable[[JointState, float], JointState] | None = None
-        self._brake = 0.0  # rad/s2; positive while the arm comes to rest
-        self.mount(tcp)
+        self._deceleration = 0.0  # m/s2 and rad/s2; positive while the arm comes to rest
+        self.tcp = np.array(tcp, dtype=float)
+        self.lookahead, self.gain = LOOKAHEAD, SERVO_GAIN
+        self._look()
 
     @property
     def resting(self) -> bool:
         """Whether no joint moves."""
         return max(map(abs, self.state.speed.tolist())) < RESTING_RATE
 
-    def mount(self, tcp: np.ndarray) -> None:
-        """Set the TCP's pose in the flange's frame."""
-        self.tcp = np.array(tcp, dtype=float)
-        self._look()
-
     def reaches(self, pose: np.ndarray) -> bool:
         """Whether the arm reaches a pose at all."""
         return inverse(self.model, pose, self.state.joints, tcp=self.tcp) is not None
 
-    def follow(
-        self, pose: np.ndarray, lookahead: float = LOOKAHEAD, gain: float = SERVO_GAIN
-    ) -> None:
+    def follow(self, pose: np.ndarray) -> None:
         """Be drawn to a pose from now on, as `servo` says.
 
         Raises:
@@ -73,29 +70,29 @@ class KinematicArm:
         found = inverse(self.model, pose, self.state.joints, tcp=self.tcp)
         if found is None:
             raise MotionError(f"no joints for pose {np.round(pose, 4).tolist()}")
-        self._brake = 0.0
+        self._deceleration = 0.0
         self._servo = partial(
             servo,
             target=found,
-            lookahead=lookahead,
-            gain=gain,
+            lookahead=self.lookahead,
+            gain=self.gain,
             fastest=np.array(self.model.joint_speed),
         )
 
-    def stop(self, rate: float) -> None:
-        """Come to rest from now on; all joints together, the fastest at a rate [rad/s2]."""
-        self._servo, self._brake = None, rate
+    def stop(self, deceleration: float) -> None:
+        """Come to rest from now on, as `braked` says."""
+        self._servo, self._deceleration = None, deceleration
 
     def tick(self, dt: float) -> None:
         """Go on for dt [s].
 
         Raises:
-            MotionError: The TCP is too fast; the caller stops the arm.
+            MotionError: The TCP has become too fast; the caller stops the arm.
         """
         if self._servo is not None:
             self.state = self._servo(self.state, dt)
-        elif self._brake and self.state.speed.any():
-            self.state = braked(self.state, dt, self._brake)
+        elif self._deceleration and self.state.speed.any():
+            self.state = braked(self.state, self.velocity, dt, self._deceleration)
         else:
             return
         self._look()
@@ -120,10 +117,9 @@ def servo(
 ) -> JointState:
     """One tick in which joints are drawn by gain * (target - joints - lookahead * speed).
 
-    This has what the manual tells of both numbers: the arm lags a moving target by `lookahead`
-    [s], a smaller one reacts faster, a larger one overshoots less, and `gain` [1/s2] stiffens.
-    The real filter is not published. Speeds are clipped to `fastest` [rad/s], accelerations to
-    `SERVO_RATE`.
+    As in the manual, the arm lags a moving target by `lookahead` [s]: a smaller one reacts faster,
+    a larger one overshoots less; `gain` [1/s2] stiffens. The real filter is not published. Speeds
+    are clipped to `fastest` [rad/s], accelerations to `SERVO_RATE`.
     """
     stay, push, swing, keep = oscillator(gain, gain * lookahead, dt)
     away = state.joints - target
@@ -139,10 +135,18 @@ def servo(
     return JointState(joints, speed)
 
 
-def braked(state: JointState, dt: float, rate: float) -> JointState:
-    """One tick in which all joints slow down together, the fastest at a rate [rad/s2]."""
-    fastest = np.abs(state.speed).max()
-    speed = state.speed * max(1.0 - rate * dt / fastest, 0.0)
+def braked(state: JointState, velocity: np.ndarray, dt: float, deceleration: float) -> JointState:
+    """One tick in which all joints slow down together, so that the TCP loses deceleration * dt.
+
+    Args:
+        state: Joints and their speeds, before the tick.
+        velocity: Of the TCP [m/s, rad/s].
+        dt: Of the tick [s].
+        deceleration: Of the TCP [m/s2] and of its turn [rad/s2]; the longer of both stops counts.
+    """
+    fastest = max(math.hypot(*velocity[:3]), math.hypot(*velocity[3:]))
+    share = 1.0 - deceleration * dt / fastest if fastest > 0.0 else 0.0
+    speed = state.speed * max(share, 0.0)
     return JointState(state.joints + 0.5 * dt * (state.speed + speed), speed)
 
 

@@ -26,15 +26,17 @@ HEADING = 0.3  # s of the way that tells a direction
 
 
 class Replay(NamedTuple):
-    """Where in its table a stick is.
+    """A stick, and where in its table it is.
 
     Attributes:
+        motion: The table.
         phase: Time of the table [s].
         still: How long the arm has waited there [s].
         near: 1 on the path, 0 where the stick hangs straight down, and between them on the way.
         rest: Time of the table at which its last rest begins [s].
     """
 
+    motion: StickMotion
     phase: float
     still: float
     near: float
@@ -45,20 +47,20 @@ def init(motion: StickMotion) -> Replay:
     """A stick that hangs straight down, before a stir."""
     away = np.linalg.norm(motion.pivot - motion.pivot[-1], axis=1) > AT_REST
     begins = int(np.flatnonzero(away)[-1]) + 1 if away.any() else 0
-    return Replay(float(motion.time[0]), 0.0, 0.0, float(motion.time[begins]))
+    return Replay(motion, float(motion.time[0]), 0.0, 0.0, float(motion.time[begins]))
 
 
-def advance(motion: StickMotion, state: Replay, pivot: Numbers, dt: float) -> Replay:
+def advance(state: Replay, pivot: Numbers, dt: float) -> Replay:
     """One tick later.
 
     A stick that has come to hang straight down starts anew.
 
     Args:
-        motion: The table.
         state: Before the tick.
         pivot: Where the arm is at its end, in the table's frame [m], shape (3,).
         dt: Of the tick [s].
     """
+    motion = state.motion
     phase, distance = _nearest(motion, state.phase, pivot, dt)
     if distance > NEAR:
         if (near := state.near - dt / FADE) > 0.0:
@@ -67,16 +69,16 @@ def advance(motion: StickMotion, state: Replay, pivot: Numbers, dt: float) -> Re
     # slower than half the table's pace, the arm waits, or comes to a stop; a rest is no stop
     waits = phase - state.phase < 0.5 * dt and _heading(motion, phase) != 0.0
     still = state.still + dt if waits else state.still * math.exp(-dt / RECOVERY)
-    return Replay(phase, still, min(state.near + dt / FADE, 1.0), state.rest)
+    return state._replace(phase=phase, still=still, near=min(state.near + dt / FADE, 1.0))
 
 
-def angles(motion: StickMotion, state: Replay) -> tuple[float, float]:
+def angles(state: Replay) -> tuple[float, float]:
     """Inclination in the xz and yz planes of the table's frame [rad].
 
     While the arm waits, the stick relaxes as in the table's last rest, turned to where the arm came
     from: strokes of a star are alike but for their direction. What it leans otherwise fades.
     """
-    lean = _lean(motion, state.phase)
+    motion, lean = state.motion, _lean(state.motion, state.phase)
     if state.still > 0.0:
         turn = _heading(motion, state.phase) * _heading(motion, state.rest).conjugate()
         first, then = _lean(motion, state.rest), _lean(motion, state.rest + state.still)

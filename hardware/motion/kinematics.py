@@ -258,9 +258,14 @@ def follow(
         arm: The Denavit-Hartenberg table.
         poses: TCP in the base frame, shape [T, 6].
         start: Joints from which the path begins [rad], shape [6]; its first step counts too.
-        times: Of the poses [s], shape [T], rising.
+        times: Of the poses [s], shape [T], increasing.
         tcp: As for `forward`.
+
+    Raises:
+        ValueError: The times are not one for each pose, or do not increase.
     """
+    if np.shape(times) != poses.shape[:1] or not (np.diff(times) > 0.0).all():
+        raise ValueError(f"{np.size(times)} times of {len(poses)} poses: give increasing ones")
     joints = np.full(poses.shape, np.nan)
     near, reached = np.asarray(start, dtype=float), len(poses)
     for k, pose in enumerate(poses):

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..rig import Rig
 from .cup_frame import cup_frame
-from .stir_paths import PosePath, over, placed, profile, travel, turn_rate
+from .stir_paths import PosePath, placed, profile, travel, turn_rate, up_and_over
 
 RAMP_SECONDS = 0.1  # s, in which the turn reaches its angular velocity, and in which it ends
 UPRIGHT_RATE = np.radians(60.0)  # rad/s, of the turn back
@@ -42,7 +42,7 @@ def approach_pour(rig: Rig, pose: np.ndarray, *, distance: float, lip_height: fl
         lip_height: Of the lip above the receiver's floor while it pours [m].
     """
     target = ready_to_pour(rig, distance, lip_height)
-    return over(rig, pose, target, rig.pouring.approach_speed)
+    return up_and_over(rig, pose, target, rig.pouring.approach_speed)
 
 
 def pour_path(

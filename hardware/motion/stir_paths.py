@@ -65,10 +65,10 @@ def approach(rig: Rig, pose: np.ndarray) -> PosePath:
         rig: What is known of the place.
         pose: Where the tool is now, position in the cup's frame, shape (6,).
     """
-    return over(rig, pose, above_cup(rig), rig.stirring.approach_speed)
+    return up_and_over(rig, pose, above_cup(rig), rig.stirring.approach_speed)
 
 
-def over(rig: Rig, pose: np.ndarray, target: np.ndarray, speed: float) -> PosePath:
+def up_and_over(rig: Rig, pose: np.ndarray, target: np.ndarray, speed: float) -> PosePath:
     """From one pose to another: straight up, then sideways, then down."""
     high = max(pose[2], target[2])
     corners = [pose, placed(pose, z=high), placed(target, z=high), target]

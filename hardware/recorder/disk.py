@@ -22,7 +22,7 @@ class Disk:
         self._log = log
 
     def write[T](self, name: str, act: Callable[[], T]) -> T | None:
-        """What `act` returns, which writes to the file `name`; None once a write has failed."""
+        """Write to the file `name` by `act`; returns its result, None once a write has failed."""
         if self.trouble is Trouble.WRITE_FAILED:
             return None
         start = host_time()

@@ -7,8 +7,8 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
 from ..board import Board, Row, Who, host_time
+from ..csv_file import CsvAppender
 from ..signals import leave_signals_to_main
-from .csv_file import CsvAppender
 from .disk import Disk, told_if_fails
 from .events import EventLog
 from .rate import counted, no_rate
@@ -52,7 +52,7 @@ def run_recorder(board: Board, samples: Connection, main: Connection, directory:
 
 
 def _arriving(samples: Connection, main: Connection, disk: Disk) -> Iterator[list[Sample]]:
-    """What comes within each heartbeat, until main lets go and the arm has sent its last sample."""
+    """Yield each heartbeat's samples, until main lets go and the arm has sent its last one."""
     ends = [samples, main]
     deadline = float("inf")
     while host_time() < deadline and ends:

@@ -6,11 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..csv_file import read_csv
 from ..errors import RigError
 from ..rig import View
 from ..safety.guards import MAX_CLOCK_DRIFT
 from ..vision.frame_measurement import FrameMeasurement
-from .csv_file import read_csv
 from .directory import VIEWS, Provenance, read_provenance
 from .names import frames_file
 from .sample import SAMPLES, Sample

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from ..csv_file import BackgroundSync, write_all
 from ..errors import missing_extra
-from .csv_file import BackgroundSync, write_all
 
 _TICK = Fraction(1, 1000)  # Matroska's own unit of time [s]
 _QUALITY = 2  # MJPEG's best: blocks of a coarser one move a line's edge

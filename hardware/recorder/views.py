@@ -74,13 +74,17 @@ def stick_view(rig: Rig, view: View, camera: CameraModel | None = None) -> Stick
     Raises:
         RigError: See `camera_model`.
     """
-    # the wall of the cup bends what is seen through it
-    model = camera or camera_model(rig.camera(view))
-    return StickView(scene(rig, view), model, rig.cup.height, rig.stick.colour)
+    return StickView(
+        scene(rig, view),
+        camera or camera_model(rig.camera(view)),
+        # the wall of the cup bends what is seen through it
+        surface_height=rig.cup.height,
+        contrast=rig.stick.colour,
+    )
 
 
 def scene(rig: Rig, view: View) -> Scene:
-    """What a rig's camera looks at."""
+    """Sizes of the cup, the stick and the marker that a rig's camera looks at."""
     camera = rig.camera(view)
     return Scene(
         marker_offset=camera.marker,

@@ -56,7 +56,7 @@ def render(stage: Stage, exposures: Sequence[WorldState], rng: np.random.Generat
 
 
 def draw(stage: Stage, exposures: Sequence[WorldState]) -> np.ndarray:
-    """What a perfect camera would see; the stick ends at the liquid's surface.
+    """Draw the picture of a perfect camera; the stick ends at the liquid's surface.
 
     Args:
         stage: What `prepare` made.

@@ -13,8 +13,8 @@ import numpy as np
 
 from ..board import Board, Row, Trouble, Who, host_time
 from ..cameras.base import CameraError, FrameSource
+from ..csv_file import CsvAppender
 from ..priority import come_first
-from ..recorder.csv_file import CsvAppender
 from ..recorder.disk import Disk, told_if_fails
 from ..recorder.events import EventLog
 from ..recorder.names import frames_file, video_file
@@ -86,7 +86,7 @@ def _wait_for_end(
 
 
 class _Tally(NamedTuple):
-    """What is remembered of the pictures so far."""
+    """Counts of the pictures so far."""
 
     rate: Rate
     row: Row = Row()  # as it goes to the board; its beat is when the last new picture came
@@ -96,7 +96,7 @@ class _Tally(NamedTuple):
 
 
 def tallied(tally: _Tally, seen: FrameMeasurement, now: float) -> _Tally:
-    """What is remembered after another picture, which came at `now` [s]."""
+    """Count another picture, which came at `now` [s]."""
     before, rate = tally.row, counted(tally.rate, 1, now)
     row = before._replace(
         count=rate.total,

@@ -35,6 +35,7 @@ class Status(NamedTuple):
         began: Paths that have begun, with the controller's time [s].
         done: Paths that are done, likewise.
         stopped: Why the arm was stopped; None while all is well.
+        closed: Whether the session ends, or has ended.
     """
 
     rows: dict[Who, Row]
@@ -43,6 +44,7 @@ class Status(NamedTuple):
     began: tuple[Began, ...]
     done: tuple[Done, ...]
     stopped: Stopped | None
+    closed: bool
 
 
 @dataclass

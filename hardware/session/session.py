@@ -37,7 +37,7 @@ class Session:
     Where other libraries of robots have another word:
 
         connect             start(), or entering the `with` block
-        is_connected        preflight() has no failures, and status().stopped is None
+        is_connected        preflight() has no failures; status() is neither stopped nor closed
         get_observation     status()
         send_action         follow(path), a whole path; wait() until it is done
         stop                stop(reason), for good
@@ -205,6 +205,7 @@ class Session:
             began=tuple(progress.began),
             done=tuple(progress.done),
             stopped=progress.stopped,
+            closed=progress.closing,
         )
 
     def stop(self, reason: str) -> None:

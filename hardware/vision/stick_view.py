@@ -13,7 +13,7 @@ SURFACE_MARGIN = 0.003  # the liquid climbs the stick, and waves
 
 @dataclass(frozen=True)
 class Scene:
-    """What one camera looks at: sizes [m]; the cup's floor is at the origin of the cup frame.
+    """Sizes before one camera [m]; the cup's floor is at the origin of the cup frame.
 
     Attributes:
         cup_radius: Of the liquid's surface and, as drawn, of the glass.
@@ -54,8 +54,8 @@ class StickView:
     """One camera's view of the stick.
 
     Attributes:
-        scene: That it looks at.
-        camera: That looks.
+        scene: Sizes of cup, stick and marker.
+        camera: Lens and place.
         surface_height: Of the liquid [m]; give the rim's height instead when the cup is not clear.
         contrast: Whether the stick is darker or brighter than what is behind it.
     """

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from bolfi_liquids.hardware.cameras import Frame, RenderedCamera
 from bolfi_liquids.hardware.rendering.coverage import PixelWindow, window_around
 from bolfi_liquids.hardware.rendering.drawing import Stage, develop, draw
 from bolfi_liquids.hardware.rendering.world import WorldState
@@ -72,6 +73,20 @@ def fault_of(index: int, share: float, stage: Stage, seed: int) -> Fault | None:
         rng.uniform(-np.pi / 2, np.pi / 2),
         rng.uniform(20.0, 170.0),
     )
+
+
+class FaultyCamera(RenderedCamera):
+    """A rendered camera with faults in a share `SHARE` of its frames."""
+
+    SHARE = 0.05
+
+    def read(self) -> Frame | None:
+        frame = super().read()
+        assert frame is not None
+        fault = fault_of(frame.index, self.SHARE, self._stage, self._timing.seed)
+        if fault is not None:
+            draw_fault(frame.image, fault)
+        return frame
 
 
 def draw_fault(image: np.ndarray, fault: Fault) -> None:

@@ -55,6 +55,12 @@ def test_the_bundled_rig_can_be_used():
         ("points = 9", "points = 9.5", "stirring.points", "9.5"),
         ("points = 9", "points = 8", "stirring.points", "8 is even"),
         ("points = 9", "pionts = 9", "stirring.pionts", "points"),
+        # only names of the section itself are proposed
+        ("[stick]", "length = 1.0\n[stick]", "cup.length", "known: position, yaw_deg, radius,"),
+        ("[cup]", 'driver = "ur"\n[cup]', "robot.driver", "known: host, controller, rate"),
+        ("[cup]", "zzz = 1\n[cup]", "robot.zzz", "known: host, controller, rate"),
+        ("[robot]", "zzz = 1\n[robot]", "zzz", "known: robot, cup, stick"),
+        ('view = "xz"', 'view = "xz"\nrates = 30.0', "cameras.0.rates", "mean rate\\?"),
         ('host = "127.0.0.1" ', "", "robot.host", "required"),
         ("x = [-0.05, 0.05]", "x = [0.05, -0.05]", "limits.stirring", "x must ascend"),
         ("force = 20.0", "force = 0.0", "limits.force", "0 N is not within 1 to"),

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-from bolfi_liquids.hardware.recorder.csv_file import read_csv
+from bolfi_liquids.hardware.csv_file import read_csv
 from scipy.interpolate import CubicSpline
 
 import bolfi_liquids as bl

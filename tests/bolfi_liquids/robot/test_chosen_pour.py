@@ -49,7 +49,7 @@ def test_the_action_is_that_of_pour_nc_to_the_last_digit(poured_run):
     chosen = bl.Pour.open(poured_run).chosen
     planned = chosen_in(poured_run)
     assert planned.judged.action == chosen.action
-    (path,) = plan_pour(planned, bundled_rig()).paths
+    path = plan_pour(planned, bundled_rig())
     turned = path.pose[:, 3:]
     assert np.ptp(turned, axis=0).max() > 1.0  # it does pour
 

@@ -37,12 +37,25 @@ def test_a_senseless_viscosity_is_refused_before_anything_starts():
             hardware.HiddenLiquid(viscosity=viscosity)
 
 
-def test_a_stir_that_cannot_be_simulated_is_refused_before_the_session(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("liquid", "said"),
+    [({"viscosity": 1e9}, "^emulated viscosity: 1000000000"), ({"seed": -1}, "^emulated seed: -1")],
+)
+def test_a_liquid_that_the_simulator_refuses_is_named_as_the_emulated_one(tmp_path, liquid, said):
+    with pytest.raises(InputError, match=said):
+        bl.record(RIG, out=tmp_path / "out", emulate=hardware.HiddenLiquid(**liquid))
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("lost", [slice(None), slice(5, 6)])
+def test_a_stir_that_cannot_be_simulated_is_refused_before_the_session(tmp_path, monkeypatch, lost):
     def fails(_liquid, gripper, _setup, seeds, _effects):
-        return np.full((len(seeds), len(gripper.time), 2), np.nan)
+        angles = np.zeros((len(seeds), len(gripper.time), 2))
+        angles[:, lost] = np.nan
+        return angles
 
     monkeypatch.setattr(models, "stir", fails)
-    with pytest.raises(InputError, match=r"viscosity.*1e\+06 Pa s"):
+    with pytest.raises(InputError, match=r"^emulated viscosity: 1e\+06 Pa s"):
         bl.record(RIG, out=tmp_path / "out", emulate=hardware.HiddenLiquid(viscosity=1e6))
     assert not (tmp_path / "out").exists()
 

@@ -15,7 +15,7 @@ pytest.importorskip("av")
 from bolfi_liquids.hardware.board import SPAWN, Board, Trouble, Who, host_time  # noqa: E402
 from bolfi_liquids.hardware.cameras.files import FilesCamera  # noqa: E402
 from bolfi_liquids.hardware.cameras.rendered import RenderedCamera, Timing  # noqa: E402
-from bolfi_liquids.hardware.recorder.csv_file import read_csv  # noqa: E402
+from bolfi_liquids.hardware.csv_file import read_csv  # noqa: E402
 from bolfi_liquids.hardware.recorder.events import read_events  # noqa: E402
 from bolfi_liquids.hardware.recorder.rate import no_rate  # noqa: E402
 from bolfi_liquids.hardware.recorder.video import VideoWriter  # noqa: E402

@@ -56,25 +56,30 @@ def test_servo_keeps_to_the_joints_speeds_and_rests_on_its_target():
 
 def test_joints_come_to_rest_together():
     speed = np.array([0.2, -0.1, 0, 0, 0, 0.4])
-    state = braked(JointState(HOME, speed), 0.1, 1.0)
-    assert state.speed == pytest.approx(0.75 * speed)
-    assert state.joints == pytest.approx(HOME + 0.1 * 0.875 * speed)
-    assert not braked(state, 1.0, 1.0).speed.any()
+    for velocity in ([0.0, 0.4, 0.0, 0.0, 0.0, 0.2], [0.0, 0.2, 0.0, 0.0, 0.0, 0.4]):
+        state = braked(JointState(HOME, speed), np.array(velocity), 0.1, 1.0)
+        assert state.speed == pytest.approx(0.75 * speed)
+        assert state.joints == pytest.approx(HOME + 0.1 * 0.875 * speed)
+    # also where the joints' speeds cancel at the TCP
+    for velocity in (np.full(6, 0.01), REST):
+        assert not braked(state, velocity, 0.1, 1.0).speed.any()
 
 
-def test_an_arm_that_is_stopped_rests_after_its_rate_and_stays():
-    arm = KinematicArm(UR10, HOME, TCP)
+@pytest.mark.parametrize("deceleration", [3.0, 1.0])
+@pytest.mark.parametrize("home", [HOME, HOME + [0, 0.4, -0.8, 0.4, 0, 0]])
+def test_a_stopped_arm_rests_after_what_its_tcp_s_deceleration_takes_and_stays(home, deceleration):
+    arm = KinematicArm(UR10, home, TCP)
     arm.follow(arm.pose + [0.0, 0.0, 0.1, 0.0, 0.0, 0.0])
     for _ in range(30):
         arm.tick(DT)
-    fastest = np.abs(arm.state.speed).max()
-    assert fastest > 0.01 and not arm.resting
-    arm.stop(1.0)
+    speed = np.linalg.norm(arm.velocity[:3])
+    assert speed > 0.05 and not arm.resting
+    arm.stop(deceleration)
     ticks = 0
     while not arm.resting:
         arm.tick(DT)
         ticks += 1
-    assert ticks * DT == pytest.approx(fastest, abs=2 * DT)
+    assert ticks * DT == pytest.approx(speed / deceleration, abs=2 * DT)
     there = arm.pose
     arm.tick(DT)
     assert (arm.pose == there).all() and not arm.velocity.any()

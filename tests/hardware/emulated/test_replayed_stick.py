@@ -47,8 +47,8 @@ def followed(motion, way, state=None):
     """Phases and angles while the pivot goes along a way, a row a tick; and the last state."""
     state, found = state or init(motion), []
     for pivot in way:
-        state = advance(motion, state, pivot, DT)
-        found.append((state.phase, *angles(motion, state)))
+        state = advance(state, pivot, DT)
+        found.append((state.phase, *angles(state)))
     return np.array(found), state
 
 

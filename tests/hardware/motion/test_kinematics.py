@@ -139,6 +139,18 @@ def test_follow_goes_along_a_path_within_the_joint_speeds():
     assert result.fastest == pytest.approx(speeds.max())
 
 
+TIMES = np.linspace(0, 1, 50)
+
+
+@pytest.mark.parametrize(
+    "times",
+    [TIMES[::-1], TIMES[:-1], TIMES[:, None], np.zeros(50), np.where(TIMES > 0.5, np.nan, TIMES)],
+)
+def test_times_that_are_not_one_a_pose_and_increasing_are_refused(times):
+    with pytest.raises(ValueError, match="times of 50 poses"):
+        kinematics.follow(UR10, straight(0.1), START, times=times, tcp=TCP)
+
+
 def test_follow_says_where_a_path_leaves_the_arm_s_reach():
     result = kinematics.follow(UR10, straight(-2.0), START, times=np.arange(50.0), tcp=TCP)
     assert result.status == "unreachable"

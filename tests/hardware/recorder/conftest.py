@@ -2,7 +2,7 @@ import json
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware.recorder.csv_file import CsvAppender
+from bolfi_liquids.hardware.csv_file import CsvAppender
 from bolfi_liquids.hardware.recorder.directory import start_directory
 from bolfi_liquids.hardware.recorder.sample import Sample
 from bolfi_liquids.hardware.vision.frame_measurement import FrameMeasurement

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bolfi_liquids.hardware.board import SPAWN, Board, Trouble, Who, host_time
-from bolfi_liquids.hardware.recorder.csv_file import CsvAppender, read_csv
+from bolfi_liquids.hardware.csv_file import CsvAppender, read_csv
 from bolfi_liquids.hardware.recorder.events import (
     RESERVE,
     RESERVE_BYTES,
@@ -77,6 +77,14 @@ def test_every_number_comes_back_bit_for_bit(tmp_path):
     columns = read_csv(tmp_path / "a.csv", FIELDS)
     assert columns["index"].tolist() == list(range(5))
     assert columns["value"].tobytes() == np.array([value for _, value in rows]).tobytes()
+
+
+def test_a_table_that_there_is_already_is_left_alone(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("index,value\n1,0.25\n")
+    with pytest.raises(FileExistsError):
+        CsvAppender(path, FIELDS)
+    assert path.read_text() == "index,value\n1,0.25\n"
 
 
 @pytest.mark.parametrize("left", ["3,0.1", "3,", "3", "", "\0\0\0\0\n", "3,0.5,7\n", "x,1\n"])

@@ -12,7 +12,7 @@ pytest.importorskip("cv2")
 pytest.importorskip("av")
 
 from bolfi_liquids.hardware.board import SPAWN, Board, Who, host_time  # noqa: E402
-from bolfi_liquids.hardware.cameras.rendered import RenderedCamera, Timing  # noqa: E402
+from bolfi_liquids.hardware.cameras.rendered import Timing  # noqa: E402
 from bolfi_liquids.hardware.recorder.directory import start_directory  # noqa: E402
 from bolfi_liquids.hardware.recorder.finalise import finalise  # noqa: E402
 from bolfi_liquids.hardware.recorder.process import run_recorder  # noqa: E402
@@ -22,6 +22,7 @@ from bolfi_liquids.hardware.rendering import Look, Scene  # noqa: E402
 from bolfi_liquids.hardware.rendering.drawing import prepare  # noqa: E402
 from bolfi_liquids.hardware.rig_file import bundled_rig  # noqa: E402
 from bolfi_liquids.hardware.session.camera_process import WHO, run_camera  # noqa: E402
+from rendered_faults import FaultyCamera  # noqa: E402
 from rendered_scenes import MovingWorld  # noqa: E402
 
 from bolfi_liquids.inputs.checks import check_values  # noqa: E402
@@ -48,7 +49,7 @@ def camera_of(view):
     stage = prepare(scene, camera_model(camera), Look())
     time = ROBOT + host_time() + np.arange(-2.0, 40.0, 0.01)
     world = MovingWorld(*(CubicSpline(time, y) for y in motion(time)), offset=ROBOT)
-    return partial(RenderedCamera, stage, world, Timing(seed=WHO[view]))
+    return partial(FaultyCamera, stage, world, Timing(seed=WHO[view]))
 
 
 class Sampler(threading.Thread):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.board import Trouble, Who
 from bolfi_liquids.hardware.motion.stir_paths import stir
+from bolfi_liquids.hardware.robot import ur
 from bolfi_liquids.hardware.robot.orders import Began, Checked, Done, Follow, Leave, Stop
 from short_rig import short_rig
 from ur_controller.patience import patient
@@ -55,7 +56,8 @@ FAULTS = {
     "an order outside": (lambda one: one.orders.put(Follow(OUTSIDE)), 0.3, "refused.*outside"),
     "leaving": (lambda one: one.orders.put(Leave()), 0.3, "told to leave during a motion"),
     "a signal": (lambda one: one.links.signals.append("SIGHUP"), 0.3, "got SIGHUP"),
-    "main's stop": (lambda one: one.orders.put(Stop("enough")), 0.3, "enough"),
+    # nothing is to be noticed first: all of it is the brake's time
+    "main's stop": (lambda one: one.orders.put(Stop("enough")), 0.05, "enough"),
 }
 PUSH = (30.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -69,6 +71,21 @@ def test_a_fault_stops_the_arm_for_good_and_says_why(stepped, name):
     assert lasted < bar
     # samples go on until the arm rests, as far as the link lets them through
     assert [row.index for row in one.rows] == list(range(len(one.rows)))
+
+
+@pytest.mark.parametrize("deceleration", [ur.STOP_DECELERATION, 1.0])
+def test_the_arm_brakes_as_its_driver_asks(stepped, monkeypatch, deceleration):
+    monkeypatch.setattr(ur, "STOP_DECELERATION", deceleration)
+    one, speeds = stepped(RIG, "stirring", PATH.pose[0], cameras=True), []
+
+    def stop():
+        speeds.append(np.linalg.norm(one.emulator.controller.arm.velocity[:3]))
+        one.orders.put(Stop("enough"))
+
+    _, lasted = one.stopped_by(stop, Follow(PATH), 0.9)
+    (speed,), tick = speeds, 1.0 / RIG.robot.rate
+    assert speed == pytest.approx(RIG.stirring.speed, rel=0.05)
+    assert speed / deceleration < lasted < speed / deceleration + 2 * tick
 
 
 @pytest.mark.parametrize("name", ["a stall", "a frozen link"])

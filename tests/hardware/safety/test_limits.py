@@ -142,6 +142,7 @@ def test_a_place_out_of_reach_is_refused():
 
 
 def reached(distance, height):
+    """Whether any joints put the stick there; a singular wrist is as good as another."""
     space = workspace(RIG, "stirring")
     pose = np.array([0.0, -distance, height, *RIG.robot.stirring_orientation])
     return inverse(space.arm, pose, space.start, tcp=space.tcp) is not None

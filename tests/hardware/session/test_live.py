@@ -16,7 +16,7 @@ ROWS = (
 
 
 def status_of(rows, *guards, stopped=None):
-    return Status(dict(zip(Who, rows, strict=True)), guards, None, (), (), stopped)
+    return Status(dict(zip(Who, rows, strict=True)), guards, None, (), (), stopped, False)
 
 
 def shown(title, status):

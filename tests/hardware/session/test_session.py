@@ -106,7 +106,9 @@ def test_a_session_that_was_not_started_takes_no_orders_and_can_be_closed(tmp_pa
     with pytest.raises(SessionStopped, match="not been started"):
         session.follow(PLAN[0])
     session.stop("nothing to stop")
+    assert not session.status().closed
     session.close()
+    assert session.status().closed
     assert not (tmp_path / "new").exists()
 
 

@@ -11,12 +11,7 @@ import sys
 from typing import NamedTuple
 
 import numpy as np
-from bolfi_liquids.hardware.emulated.arm import (
-    PROGRAM_STOP_RATE,
-    PROTECTIVE_BITS,
-    PROTECTIVE_STOP_RATE,
-    STOPPED,
-)
+from bolfi_liquids.hardware.emulated.arm import PROTECTIVE_BITS, PROTECTIVE_STOP, STOPPED
 from bolfi_liquids.hardware.emulated.motion import KinematicArm, MotionError
 from bolfi_liquids.hardware.host_clock import REAL_CLOCK, HostClock
 from bolfi_liquids.hardware.motion.kinematics import ARMS
@@ -46,6 +41,7 @@ MODELS = {
     "cb3": Model((3, 15, 8, 106339), 125.0, "URSoftware 3.15.8.106339 (Nov 05 2021)"),
     "e-series": Model((5, 11, 6, 108000), 500.0, "URSoftware 5.11.6.108000 (Nov 10 2021)"),
 }
+PROGRAM_STOP = 3.0  # m/s2 and rad/s2, when a program ends in motion
 # elbow up, tool pointing down, in front of the base
 HOME_JOINTS = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
 
@@ -131,13 +127,13 @@ class Controller:
             return
         self._note(f"program stopped: {reason}")
         self.program, self._watchdog = None, None
-        self.arm.stop(PROGRAM_STOP_RATE)
+        self.arm.stop(PROGRAM_STOP)
 
     def protective_stop(self, reason: str) -> None:
         self._note(f"protective stop: {reason}")
         self._protective_since = self.clock.now()
         self.program, self._watchdog = None, None
-        self.arm.stop(PROTECTIVE_STOP_RATE)
+        self.arm.stop(PROTECTIVE_STOP)
 
     def unlock(self) -> bool:
         """End a protective stop; nothing moves by that. False if it is too early."""
@@ -160,6 +156,10 @@ class Controller:
 
     def set_payload(self, mass: float, centre: tuple[float, ...]) -> None:
         self.payload = (mass, centre)
+
+    def mount(self, tcp: np.ndarray) -> None:
+        """Give the arm, at rest, another tool's centre in the flange's frame."""
+        self.arm = KinematicArm(self.arm.model, self.arm.state.joints, tcp)
 
     def skip(self, ticks: int) -> None:
         """Let the clock go on by ticks that the computer had no time for."""

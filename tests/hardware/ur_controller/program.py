@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from bolfi_liquids.hardware.emulated.arm import PROGRAM_STOP_RATE
 from bolfi_liquids.hardware.emulated.motion import KinematicArm
 
 from .registers import Registers
@@ -109,12 +108,12 @@ class Program:
         numbers = self._numbers(11)
         if numbers != self._set_point:
             self._set_point = numbers
-            *pose, _, _, _, lookahead, gain = numbers
-            self._arm.follow(np.array(pose), lookahead, gain)
+            *pose, _, _, _, self._arm.lookahead, self._arm.gain = numbers
+            self._arm.follow(np.array(pose))
 
     def _servo_stop(self) -> None:
         self._set_point, self._stopping = [], True
-        self._arm.stop(PROGRAM_STOP_RATE)
+        self._arm.stop(self._numbers(1)[0])
 
     def _set_payload(self) -> None:
         mass, *centre = self._numbers(4)
@@ -124,7 +123,7 @@ class Program:
         offset = self._pose()
         if not np.isfinite(offset).all():
             raise ProgramError(f"TCP offset {offset.tolist()} is not finite")
-        self._arm.mount(offset)
+        self._machine.mount(offset)
 
     @property
     def _arm(self) -> KinematicArm:

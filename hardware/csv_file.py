@@ -1,5 +1,6 @@
 """Tables that grow while something happens, and that survive the death of their writer."""
 
+import errno
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -57,11 +58,16 @@ class CsvAppender:
 
     The rows of one call go to the file by one `write`. A loss of power costs what came in the
     last second, as `BackgroundSync` says.
+
+    Raises:
+        OSError: The file holds something already, or it cannot be written.
     """
 
     def __init__(self, path: Path, fields: Sequence[str]):
         self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
         try:
+            if os.fstat(self._file).st_size > 0:
+                raise FileExistsError(errno.EEXIST, "holds something already", str(path))
             write_all(self._file, (",".join(fields) + "\n").encode())
         except OSError:
             os.close(self._file)
