@@ -58,7 +58,7 @@ def simulations_dataset(prior: Prior, history: History) -> xr.Dataset:
 def results_tree(
     fit: "Fit", made: Sampled, seed: int, attributes: Mapping[str, object]
 ) -> xr.DataTree:
-    """What `Fit.sample` returns.
+    """The tree that `Fit.sample` returns.
 
     Args:
         fit: What was sampled.

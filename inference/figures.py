@@ -6,8 +6,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 from xarray import DataTree
 
-from .arguments import check_kind
-
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -56,7 +54,8 @@ def plot_search(history: "History", ax: "Axes | None") -> "Axes":
 
 def plot_predictive(fit: "Fit", sampled: DataTree | None, axes: Any) -> "list[Axes]":
     """See `Fit.plot_predictive`; what has another shape than the data is left out."""
-    check_kind("sampled", sampled, DataTree | None)
+    if not isinstance(sampled, DataTree | None):
+        raise ValueError(f"sampled must be what `sample` returned or None, got {sampled!r:.100}")
     check_axes(axes)
     tree = fit.sample(draws=250, warmup=250, warn=False) if sampled is None else sampled
     observed, closest = fit.observed, fit.closest.signal
