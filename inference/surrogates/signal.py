@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -103,11 +104,11 @@ class SignalSurrogate(OfProcesses):
     scale: OutputScale = Plain(np.zeros(0), None)
 
     @property
-    def gp(self) -> GP:
+    def gp(self) -> GP:  # pyright: ignore  nobody sets it
         return self.emulator.gp
 
-    @property
-    def log_likelihood(self) -> SignalLikelihood:
+    @cached_property
+    def log_likelihood(self) -> SignalLikelihood:  # pyright: ignore  nobody sets it
         found = likelihood_of(self.emulator, self.reduced, self.box)
         return found._replace(success=self.success)
 
