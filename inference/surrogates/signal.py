@@ -194,7 +194,7 @@ class SignalSurrogate(OfProcesses):
         """Whether parameters and noise explain what was observed."""
         if not self.emulator.basis.used and self.emulator.size is None:
             return True
-        return not (self._missed() or self._smooth() or self._outside())
+        return not (self._missed() or self._smooth() or self._outside() or self.unreached)
 
     def warnings(self, *, confirmed: bool = False) -> list[str]:
         """Warnings of the emulator's own checks, unless it is confirmed, and of the data."""
