@@ -239,5 +239,5 @@ class SurrogateView:
     @property
     @in_float64
     def warnings(self) -> list[str]:
-        """Warnings of the surrogate's own checks, in sentences."""
+        """Warnings of the surrogate's own checks and of the observed values, in sentences."""
         return self.learned.warnings()

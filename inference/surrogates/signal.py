@@ -197,7 +197,8 @@ class SignalSurrogate(OfProcesses):
         return not (self._missed() or self._smooth() or self._outside() or self.unreached)
 
     def warnings(self, *, confirmed: bool = False) -> list[str]:
-        """Warnings of the emulator's own checks, unless it is confirmed, and of the data."""
+        """Warnings of the emulator's own checks, unless it is confirmed, of noise and misfit, and
+        of the observed values."""
         repeats, sized = self.emulator.repeats, self.emulator.size is not None
         if self.emulator.basis.used == 0 and not sized:
             if self.emulator.equal:
@@ -219,7 +220,7 @@ class SignalSurrogate(OfProcesses):
         return said + self._of_data()
 
     def _of_data(self) -> list[str]:
-        """Warnings of the observed values themselves."""
+        """Warn of positive values that span decades, and of a number that no run reaches."""
         ranges = warnings.range_warnings(self.scale.observed) if self.known is None else []
         return ranges + self.unreached
 
