@@ -5,6 +5,7 @@ Loads nothing but NumPy, for workers import it.
 
 import math
 from collections.abc import Callable, Mapping
+from inspect import signature
 from operator import index
 from typing import Any
 
@@ -106,11 +107,13 @@ def checked_integer(name: str, value: object, least: int = 1, most: int = LARGES
     Raises:
         ValueError: not an integer, or not from `least` to `most`.
     """
+    refusal = f"{name} must be an integer from {least} to {most}, got {value!r:.100}"
     try:
-        number = least - 1 if isinstance(value, bool) else index(value)  # pyright: ignore[reportArgumentType]  or TypeError
-    except TypeError:
-        number = least - 1
-    _check(name, value, least <= number <= most, f"an integer from {least} to {most}")
+        number = index(value)  # pyright: ignore[reportArgumentType]  or TypeError
+    except TypeError as error:
+        raise ValueError(refusal) from error
+    if isinstance(value, bool) or not least <= number <= most:
+        raise ValueError(refusal)
     return number
 
 
@@ -124,6 +127,21 @@ def checked_array(name: str, value: object) -> np.ndarray:
         return float64(value)
     except Unusable as error:
         raise ValueError(f"{name} must be an array of numbers, got {value!r:.100}") from error
+
+
+def check_called(name: str, value: Any, *arguments: str) -> None:
+    """Raise ValueError unless `value` can be called with so many arguments, by position."""
+    try:
+        called = signature(value)
+    except (TypeError, ValueError):  # of compiled code
+        return
+    try:
+        called.bind(*arguments)
+    except TypeError as error:
+        raise ValueError(
+            f"{name} must be called with ({', '.join(arguments)}), got {value!r:.100}, which is "
+            f"called with {called}"
+        ) from error
 
 
 def _check(name: str, value: object, fits: object, due: str) -> None:

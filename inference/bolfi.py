@@ -92,7 +92,7 @@ class Bolfi(Displayed):
             MOST_SIMULATIONS,
         )
         name = self.family.name or type(self.family).__name__
-        self._acquire = resolve_acquisition(acquisition, name, self.family.acquisition)
+        self._acquire = resolve_acquisition(acquisition, self.family)
         self.settings: dict[str, object] = {
             "surrogate": name,
             **{name: describe(value) for name, value in vars(self.family).items()},
@@ -351,7 +351,7 @@ class Bolfi(Displayed):
         if self.succeeded < MIN_LEARN:
             raise ValueError(
                 f"a fit needs {MIN_LEARN} successful simulations, got {self.succeeded} of "
-                f"{self.told} told; tell more; the last error: {self.history.last_error}"
+                f"{self.told} told; tell more{self.history.last_error}"
             )
         started = time.perf_counter()
         fitted = in_float64(self.family.learn)(self._training_data(), self._words())

@@ -82,8 +82,9 @@ class History(NamedTuple):
 
     @property
     def last_error(self) -> str:
-        """Why the last of the failed runs failed; "none" where none did."""
-        return next((str(failure) for failure in self.why[::-1] if failure is not None), "none")
+        """Why the last of the failed runs failed, as the end of a message; "" where none did."""
+        failed = [failure for failure in self.why if failure is not None]
+        return f"; the last error: {failed[-1]}" if failed else ""
 
     @property
     def failures(self) -> dict[str, int]:

@@ -31,8 +31,8 @@ from .simulations.job import (
     BATCH,
     Job,
     Limit,
-    batched,
     columns,
+    for_engine,
     jobs,
     of_one_shape,
     simulation_seed,
@@ -160,7 +160,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         check_flag(name, flag)
     if budget or simulate is not None:
         check_function("simulate", simulate)
-    simulator = batched(simulate, vectorised, together, time_limit)
+    simulator = for_engine(simulate, vectorised, together, time_limit)
     told = _length(earlier)
     if budget + told > MOST_SIMULATIONS:
         raise ValueError(
@@ -203,7 +203,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         if engine.succeeded < MIN_LEARN:
             raise RuntimeError(
                 f"{engine.succeeded} of {engine.told} simulations succeeded, copies counted once; "
-                f"{MIN_LEARN} are needed; the last error: {engine.history.last_error}. "
+                f"{MIN_LEARN} are needed{engine.history.last_error}. "
                 f"{runner.bank.where}; mend the cause, or raise budget, and repeat the call to go "
                 "on from there"
             )
@@ -353,8 +353,7 @@ def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Si
     engine.tell(theta, signals, seeds, errors)
     if engine.told >= engine.initial and engine.succeeded == 0:
         raise RuntimeError(
-            f"all {engine.told} simulations of the start design failed; the last error: "
-            f"{engine.history.last_error}"
+            f"all {engine.told} simulations of the start design failed{engine.history.last_error}"
         )
     return results
 

@@ -1,6 +1,6 @@
 """The engine as a pipeline, with simulations of its own or with a design that is shared."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from inspect import signature
@@ -18,7 +18,7 @@ from .arguments import (
     checked_integer,
     checked_mapping,
 )
-from .bolfi import MIN_LEARN, MOST_SIMULATIONS
+from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
 from .checks.of_fit import check_sampling
 from .checks.one_replicate import LogDensity
 from .loop import fit
@@ -27,7 +27,7 @@ from .progress import progress_bar
 from .simulations.bank import SimulationBank
 from .simulations.compute import open_compute
 from .simulations.executors import Workers
-from .simulations.job import BATCH, batched, jobs, simulation_seed, stacked
+from .simulations.job import BATCH, for_engine, jobs, simulation_seed, stacked
 from .simulations.runner import run_missing
 from .sobol import sobol
 from .surrogates.families import resolve
@@ -39,15 +39,14 @@ CALLING = "vectorised", "together", "time_limit"  # options of `fit` about its s
 OF_PIPELINE = {"simulate", "prior", "observed", "budget", "seed"}  # what a pipeline gives itself
 
 
-def _check_options(options: Options, sampling: Options) -> None:
-    """Raise ValueError for options that `fit` or `Fit.sample` refuses."""
-    known = signature(fit).parameters
-    of_family = {name: value for name, value in options.items() if name not in known}
+def _check_options(options: Options, known: Iterable[str]) -> None:
+    """Raise ValueError for options of `fit` that are neither `known` nor their surrogate's."""
+    names = signature(fit).parameters
+    of_family = {name: value for name, value in options.items() if name not in names}
     resolve(options.get("surrogate"), of_family)
     allowed = {*known, *of_family} - OF_PIPELINE - {"options"}
     if wrong := set(options) - allowed:
         raise ValueError(f"options must be among {sorted(allowed)}, got {sorted(wrong)}")
-    check_sampling(sampling)
 
 
 @dataclass(frozen=True)
@@ -80,10 +79,11 @@ class FitPipeline:
         options = checked_mapping("options", self.options, "values")
         least = 0 if "earlier" in options else MIN_LEARN
         checked_integer("budget", self.budget, least, MOST_SIMULATIONS)
-        _check_options(options, checked_mapping("sampling", self.sampling, "values"))
+        _check_options(options, signature(fit).parameters)
+        check_sampling(self.sampling)
         check_flag("options['vectorised']", options.get("vectorised", True))
         called = {name: options.pop(name) for name in CALLING if name in options}
-        object.__setattr__(self, "simulate", batched(self.simulate, **called))
+        object.__setattr__(self, "simulate", for_engine(self.simulate, **called))
         object.__setattr__(self, "options", options)
 
     def __call__(self, observed: np.ndarray, seed: int) -> "tuple[xr.DataTree, LogDensity]":
@@ -120,7 +120,7 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
         n: Simulations, at least three.
         batch: Simulations in one call, and stored together, where there is no executor.
         seed: Fixes the points and the simulations' seeds.
-        options: Of `fit`, such as {"surrogate": "signal"}.
+        options: Of `fit`, such as {"surrogate": "signal"}: of the surrogate and about `simulate`.
         sampling: Of `Fit.sample`, such as {"chains": 2, "draws": 250}.
         warn: Whether a replicate's complaints are raised as warnings.
 
@@ -130,7 +130,9 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
         ImportError, ConnectionError: Dask is not installed, or does not answer.
     """
     n = checked_integer("n", n, MIN_LEARN, MOST_SIMULATIONS)
-    pipeline = FitPipeline(simulate, prior, n, options or {}, sampling or {}, warn)
+    options = checked_mapping("options", options, "values")
+    _check_options(options, {*signature(Bolfi).parameters, *CALLING})
+    pipeline = FitPipeline(simulate, prior, n, options, sampling or {}, warn)
     seed = checked_integer("seed", seed, 0)
     check_progress(progress)
     check_text("identity", identity)
@@ -139,7 +141,7 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
     with ExitStack() as stack:
         compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         advance = stack.enter_context(progress_bar("simulations", n, shown=progress))
-        simulator, asked = batched(pipeline.simulate), jobs(theta, seeds)
+        simulator, asked = for_engine(pipeline.simulate), jobs(theta, seeds)
         made = run_missing(simulator, asked, compute, identity=identity, advance=advance)
     good = sum(result.signal is not None for result in made)
     if good < MIN_LEARN:

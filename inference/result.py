@@ -82,8 +82,8 @@ class Fit(Displayed):
         settings: How the run was made.
         seconds: Time in the "simulator" and in the "engine" [s].
         before: The posterior of which `Bolfi.confirm` drew last; None where it never did.
-        made_by: How; None if not by `fit`, or without a simulator, or if the fit was pickled, for
-            simulators may not be.
+        made_by: How it was made; None if not by `fit`, or without a simulator, or if the fit was
+            copied or pickled, for simulators may not be.
     """
 
     prior: Prior
@@ -108,8 +108,8 @@ class Fit(Displayed):
         """
         if self.made_by is None:
             raise ValueError(
-                "the fit has no simulator: `fit` did not make it, or it was pickled; give the "
-                "simulator to inference.replicates or criticism.criticise"
+                "the fit has no simulator: `fit` did not make it from one, or it was copied or "
+                "pickled; give the simulator to inference.replicates or criticism.criticise"
             )
         return self.made_by
 

@@ -34,7 +34,7 @@ def stir(
         effects: Coefficients of `EFFECTS` by name, scalars or of shape [B]; they act in the
             alphabetical order of their names, those in the rig and in the liquid before those
             in the sensor.
-        watch: What looks on at each of its scenes.
+        watch: Observer of each scene.
 
     Returns:
         Angles [rad] from the downward vertical in the xz and yz planes at the gripper's times,

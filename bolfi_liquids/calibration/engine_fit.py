@@ -121,6 +121,7 @@ def confirmed(
         observed=fit.observed,
         history=made.history._replace(rounds=rounds),
         seconds={part: spent + made.seconds[part] for part, spent in fit.seconds.items()},
+        made_by=None,  # of the corrected data
     )
 
 

@@ -1,30 +1,28 @@
 """The acquisition that a user gives, and what it chooses."""
 
-from inspect import signature
 from typing import Any, cast
 
 import numpy as np
 
-from ..arguments import checked_array
-from ..surrogates.base import Acquisition
+from ..arguments import check_called, checked_array
+from ..surrogates.base import Acquisition, Family
 from .rules import RULES, LowerConfidenceBound
 
 DIGITS, EDGE = 7, 1e-7  # of the prior quantiles that are asked, and how near the bounds
 
 
-def resolve_acquisition(given: str | Acquisition | None, family: str, best: str) -> Acquisition:
+def resolve_acquisition(given: str | Acquisition | None, family: Family) -> Acquisition:
     """The acquisition that a user means.
 
     Args:
-        given: As in `Bolfi`.
-        family: The surrogate's name.
-        best: The name that None stands for.
+        given: As in `Bolfi`; None is the family's own.
+        family: Of the surrogates by which it will choose.
 
     Raises:
         ValueError: an unknown name, nothing that can be called as an acquisition is, or "lcb"
-            for another surrogate than the one that it is made for.
+            for surrogates without a lower bound.
     """
-    acquisition: Any = best if given is None else given
+    acquisition: Any = family.acquisition if given is None else given
     if isinstance(acquisition, str):
         if acquisition not in RULES:
             raise ValueError(
@@ -35,27 +33,14 @@ def resolve_acquisition(given: str | Acquisition | None, family: str, best: str)
         raise ValueError(
             f"acquisition must be a name or an object to be called, got {acquisition!r:.100}"
         )
-    _check_called(acquisition)
-    if isinstance(acquisition, LowerConfidenceBound) and family != "discrepancy":
+    check_called("acquisition", acquisition, "key", "surrogate", "n")
+    if isinstance(acquisition, LowerConfidenceBound) and not family.has_lower_bound:
+        others = tuple(name for name in RULES if name != "lcb")
         raise ValueError(
-            f"the acquisition 'lcb' needs surrogate='discrepancy', got {family!r}; use one "
-            f"of {tuple(name for name in RULES if name != 'lcb')}"
+            "the acquisition 'lcb' needs surrogate='discrepancy', or another that has a lower "
+            f"bound, got {family!r:.100}; use one of {others}"
         )
     return cast(Acquisition, acquisition)
-
-
-def _check_called(acquisition: Any) -> None:
-    try:
-        called = signature(acquisition)
-    except (TypeError, ValueError):  # of compiled code
-        return
-    try:
-        called.bind(None, None, None)
-    except TypeError as error:
-        raise ValueError(
-            "acquisition must be called with (key, surrogate, n), got "
-            f"{acquisition!r:.100}, which is called with {called}"
-        ) from error
 
 
 def chosen(u: object, shape: tuple[int, int]) -> np.ndarray:

@@ -6,7 +6,7 @@ point of a batch before it chooses the next (see `fantasize` of the surrogates).
 
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -16,7 +16,6 @@ from ..arguments import checked_number
 from ..gp.namespaces import log_sum_exp
 from ..gp.optimise import minimise_in_box
 from ..surrogates.base import Surrogate
-from ..surrogates.discrepancy import DiscrepancySurrogate
 from .screen import ROUNDS, screen
 
 CANDIDATES = 128  # points among which a rule chooses
@@ -49,8 +48,13 @@ class LowerConfidenceBound:
     def __post_init__(self) -> None:
         checked_number("jitter", self.jitter, lambda sd: 0.0 < sd < np.inf, "positive")
 
-    def __call__(self, key: jax.Array, surrogate: DiscrepancySurrogate, n: int) -> np.ndarray:
-        """n points u [n, d]; each is fantasized before the next is chosen."""
+    def __call__(self, key: jax.Array, surrogate: Any, n: int) -> np.ndarray:
+        """n points u [n, d]; each is fantasized before the next is chosen.
+
+        Args:
+            key, n: See `Acquisition`.
+            surrogate: Of a family that has a `lower_bound`.
+        """
         rng, points = generator(key), []
         while len(points) < n:
             width = exploration_width(*surrogate.u.shape)

@@ -80,7 +80,7 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     Raises:
         ValueError: bad argument; a store made with other settings; a pipeline that returns
             something of the wrong form, or a simulator that does so in all of the first
-            replicates. Replicates of which it does so are not kept.
+            replicates of a store. Replicates of which it does so are not kept.
     """
     check_function("pipeline", pipeline)
     simulator = _own(pipeline, "simulate", simulate)
@@ -111,14 +111,14 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
         missing = [number for number in range(n) if number not in done]
         with closing(_run(plan, missing, truths, workers)) as made:
             unusable = 0
-            for ran, replicate in enumerate(made, 1):
+            for replicate in made:
+                done[replicate.number] = replicate
                 if not is_unusable(replicate.error):
                     kept.put(replicate)
                 else:  # the next call tries it again
                     unusable += 1
-                    if unusable == ran == BATCH:  # all would fail in the same way
+                    if unusable == len(done) == BATCH:  # all would fail in the same way
                         raise ValueError(f"{replicate.stage}: {replicate.error.text}")
-                done[replicate.number] = replicate
                 advance(1)
     ordered = [done[number] for number in range(n)]
     finished = tuple(r for r in ordered if r.error is None)

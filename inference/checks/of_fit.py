@@ -10,7 +10,7 @@ import numpy as np
 from .._lazy import xr
 from ..arguments import checked_mapping
 from ..criticism.measurement_noise import Noise, samples
-from ..criticism.of_fit import noise_of
+from ..criticism.of_fit import noise_of, recipe_of
 from ..prior import Prior
 from ..result import Fit, Recipe
 from ..types import Simulator
@@ -59,7 +59,7 @@ class LikeObserved:
     noise: Noise | None
 
     def __call__(self, signal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """What is observed of a signal [*signal_shape]."""
+        """Add gaps and noise to a signal [*signal_shape]."""
         gaps = np.where(self.there, 0.0, np.nan)
         if self.noise is not None:
             gaps[self.there] = self.noise.draw(rng, samples(gaps), 1)[0]
@@ -118,9 +118,10 @@ def check_fit(
         how: Other arguments of `replicates`, such as `store`, `executor` or `seed`.
 
     Raises:
-        ValueError: the fit has no recipe, its noise cannot be drawn, or an argument is bad.
+        ValueError: the fit has no recipe or no data, its noise cannot be drawn, or an argument is
+            bad.
     """
-    recipe = fit.recipe
+    recipe = recipe_of(fit)
     if observe is None:
         estimated = getattr(recipe.options["surrogate"], "noise", None) is None
         noise = None if estimated else noise_of(fit)

@@ -5,9 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from ..result import Fit
+from ..arguments import check_kind
+from ..result import Fit, Recipe
+from ..surrogates.given_noise import given_sds
+from ..surrogates.noise.by_mean import law_of
 from ..surrogates.noise.scales import Plain
-from ..surrogates.signal import SignalSurrogate
+from ..surrogates.signal import SignalFamily, SignalSurrogate
 from .criticise import Criticism, criticise
 from .experiment import Experiment
 from .measurement_noise import DRAWS, AutoregressiveNoise, KnownNoise, Noise
@@ -36,10 +39,10 @@ def criticise_fit(
         how: Other arguments of `criticise`, such as `held_out`, `bank` or `seed`.
 
     Raises:
-        ValueError: the fit has no recipe, its noise is not known, its signals have another shape
-            than what was observed, or an argument is bad.
+        ValueError: the fit has no recipe or no data, its noise is not known, its signals have
+            another shape than what was observed, or an argument is bad.
     """
-    recipe, found = fit.recipe, noise_of(fit) if noise is None else noise
+    recipe, found = recipe_of(fit), noise_of(fit) if noise is None else noise
     if found is None:
         raise ValueError(
             "the noise between simulator and data is not known; give noise=, such as "
@@ -57,22 +60,37 @@ def criticise_fit(
     return criticise(data, fit.prior, extensions, earlier=earlier, **how)
 
 
+def recipe_of(fit: Fit) -> Recipe:
+    """How a fit was made to data that its simulator simulates.
+
+    Raises:
+        ValueError: it is no fit, has no recipe, or its simulator returns log likelihoods.
+    """
+    check_kind("fit", fit, Fit)
+    if not np.isfinite(fit.observed).any():
+        raise ValueError(
+            "the fit has no data: its simulator returns log likelihoods, so data can neither be "
+            "simulated nor compared with it; fit a simulator of the data to them"
+        )
+    return fit.recipe
+
+
 def noise_of(fit: Fit) -> Noise | None:
     """The measurement noise that a fit was given, or estimated; None where draws of it cannot be
-    made of that: of a summary, by the mean, of an estimate over several channels or of averages.
+    made of that: of a summary, by the mean, a covariance alone, of an estimate over several
+    channels or of averages.
     """
     family = fit.recipe.options["surrogate"]
-    given = getattr(family, "noise", None)
-    if getattr(family, "summary", None) is not None:
+    if not isinstance(family, SignalFamily) or family.summary is not None:
         return None
+    given: Any = family.noise
+    if given is None:
+        return _estimated(fit)
     if hasattr(given, "covariance") and hasattr(given, "draw"):
         return given
-    if isinstance(given, int | float):
-        return KnownNoise(float(given))
-    if given is not None:
-        shape, there = np.shape(given), np.isfinite(fit.observed)
-        return KnownNoise(np.asarray(given, float)[there]) if shape == there.shape else None
-    return _estimated(fit)
+    by_mean = law_of(given) is not None
+    sds = None if by_mean else given_sds(given, family.view(fit.observed).output)
+    return None if sds is None else KnownNoise(sds if sds.ndim else float(sds))
 
 
 def _estimated(fit: Fit) -> Noise | None:

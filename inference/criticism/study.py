@@ -69,7 +69,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Study:
-    """What all steps of a criticism share.
+    """Data, model and means that all steps share.
 
     Attributes:
         experiment: The data, and the simulator that should explain them.

@@ -196,7 +196,7 @@ def _blocks(
         last = [_begin(*one, warmup=warmup) for one in zip(y, seeds, strict=True)]
         try:
             first = block(list(start))
-        except jax.errors.TracerArrayConversionError as error:
+        except (jax.errors.TracerArrayConversionError, jax.errors.ConcretizationTypeError) as error:
             raise ValueError(
                 "'nuts' needs a surrogate whose log_likelihood takes arrays of JAX, too, as those "
                 "with u.__array_namespace__() do; sample with 'emcee' or 'quadrature'"

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from os import PathLike
 from pathlib import Path
 
 from ..arguments import check_timeout, checked_integer
@@ -64,7 +65,10 @@ def open_compute(
     """
     checked = Compute(None, timeout, batch)
     with ExitStack() as stack:
-        workers = stack.enter_context(open_executor(executor, one_thread=one_thread))
         if bank is not None and not isinstance(bank, SimulationBank):
+            if not isinstance(bank, str | PathLike) or not str(bank):
+                due = "the path of a file or a SimulationBank"
+                raise ValueError(f"bank must be {due}, got {bank!r:.100}")
             bank = stack.enter_context(SimulationBank(bank))
+        workers = stack.enter_context(open_executor(executor, one_thread=one_thread))
         yield replace(checked, executor=workers, bank=bank)

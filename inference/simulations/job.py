@@ -127,17 +127,30 @@ class OneByOne:
         return np.stack([float64(self.simulate(*job)) for job in jobs(theta, seeds)])
 
 
-def batched(
+def for_engine(
     simulate: Simulator | SingleSimulator,
     vectorised: bool = True,
     together: int = 1,
     time_limit: Limit | None = None,
 ) -> BatchSimulator | OneByOne:
-    """What a user gives as one that the engine calls; what is one already stays."""
+    """Wrap a user's simulator for the engine; keep one that is wrapped.
+
+    Raises:
+        ValueError: bad argument, or one that contradicts the simulator.
+    """
     if isinstance(simulate, BatchSimulator | OneByOne):
+        if not vectorised or together != 1 or time_limit is not None:
+            raise ValueError(
+                f"a {type(simulate).__name__} holds itself how it is called: leave vectorised, "
+                "together and time_limit out"
+            )
         return simulate
     if vectorised:
         return BatchSimulator(cast(Simulator, simulate), together, time_limit)
+    if together != 1:
+        raise ValueError(
+            f"vectorised=False makes one run in each call: leave out together={together!r:.100}"
+        )
     return OneByOne(cast(SingleSimulator, simulate), time_limit)
 
 

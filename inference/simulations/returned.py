@@ -36,14 +36,15 @@ def told_signals(
         shape: Of one signal; None accepts any, also one of each.
 
     Returns:
-        n signals of float64, None where something else came; and what came there, "" elsewhere.
+        n signals of float64, read-only, None where something else came; and what came there, ""
+        elsewhere.
 
     Raises:
         Unusable: not n signals, or none of them can be used.
     """
     try:
         rows = signals_of(given, n, shape)
-        return [rows[i, ...] for i in range(n)], [""] * n
+        return [_read_only(rows[i, ...]) for i in range(n)], [""] * n
     except Unusable:
         if isinstance(given, np.ndarray) and given.dtype == object and given.ndim == 1:
             given = given.tolist()
@@ -60,7 +61,13 @@ def _signal_or_fault(given: object, due: tuple[int, ...] | None) -> tuple[np.nda
         row = float64(given)
     except Unusable as bad:
         return None, bad.got
-    return (row, "") if due in (None, row.shape) else (None, str(row.shape))
+    return (_read_only(row), "") if due in (None, row.shape) else (None, str(row.shape))
+
+
+def _read_only(array: np.ndarray) -> np.ndarray:
+    seen = array.view()
+    seen.flags.writeable = False
+    return seen
 
 
 def commonest(shapes: list[tuple[int, ...]]) -> tuple[int, ...] | None:

@@ -122,14 +122,17 @@ class Family(Protocol):
     """How runs are compared with what was observed, and what is learned of them.
 
     Attributes:
-        name: Kept with the results; where it is empty that of the class is.
+        name: Kept with the results; if it is empty, the class name is kept.
         acquisition: Name of the rule that chooses where nobody says which.
         replicates: Whether some points are simulated twice, to show run-to-run noise.
+        has_lower_bound: Whether its surrogates have the method `lower_bound(u, width)`, which "lcb"
+            minimises: mean less `width` sds of what is least where the data are explained, [n].
     """
 
     name: ClassVar[str] = ""
     acquisition: ClassVar[str] = "draws"
     replicates: ClassVar[bool] = False
+    has_lower_bound: ClassVar[bool] = False
 
     def learn(self, data: TrainingData, key: np.ndarray) -> Surrogate:
         """The surrogate on which a fit rests.
@@ -176,13 +179,18 @@ class Family(Protocol):
         return observed
 
     def measure(self, observed: Any, signals: Sequence[np.ndarray | None]) -> Measured:
-        """Features and discrepancies of n signals, None where a run failed: here the values of
-        each, and the sum of their squared differences to what was observed."""
-        features = np.full((len(signals), observed.size), np.nan)
-        for row, signal in zip(features, signals, strict=True):
-            if signal is not None and signal.shape == observed.shape:
-                row[:] = signal.ravel()
-        return Measured(features, *evaluate(sum_of_squares, observed, signals))
+        """Features and discrepancies of n signals, read-only and None where a run failed: here the
+        values of each, and the sum of their squared differences to what was observed."""
+        return Measured(flattened(observed, signals), *evaluate(sum_of_squares, observed, signals))
+
+
+def flattened(observed: np.ndarray, signals: Sequence[np.ndarray | None]) -> np.ndarray:
+    """The values of each signal [n, m]; NaN where one has another shape than what was observed."""
+    features = np.full((len(signals), observed.size), np.nan)
+    for row, signal in zip(features, signals, strict=True):
+        if signal is not None and signal.shape == observed.shape:
+            row[:] = signal.ravel()
+    return features
 
 
 class Acquisition(Protocol):
@@ -231,5 +239,5 @@ class SurrogateView:
     @property
     @in_float64
     def warnings(self) -> list[str]:
-        """Warnings of the surrogate's own checks, in sentences."""
+        """Warnings of the surrogate's own checks and of the observed values, in sentences."""
         return self.learned.warnings()

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from ..gp.process import (
 )
 from ..types import Discrepancy
 from . import warnings
-from .base import Family, Measured, TrainingData
+from .base import Family, Measured, TrainingData, flattened
 from .processes import OfProcesses
 from .squared_difference import MIN_FREEDOM, evaluate, independent, numbers, squared_difference
 from .success import learn_success
@@ -58,7 +59,7 @@ class DiscrepancySurrogate(OfProcesses):
     """GP of g(Delta); see `learn`.
 
     Attributes:
-        process: The conditioned process.
+        gp: The conditioned process.
         scale: g, and the standardisation of g(Delta).
         discrepancy: What was learned from [n].
         threshold: eps on the scale of g(Delta).
@@ -69,11 +70,11 @@ class DiscrepancySurrogate(OfProcesses):
         noisy: Whether the noise of g(Delta) alone makes the posterior wider than the data do, as
             far as the threshold is `Matched`.
         resolution: Sd on the scale of g(Delta) from which doubt counts against a place, see
-            `threshold.log_likelihood`; infinite while it shall attract runs.
+            `ThresholdLikelihood`; infinite while it shall attract runs.
         said: What the outputs, of which the surrogate knows nothing, have been found to lack.
     """
 
-    process: GP
+    gp: GP
     scale: DiscrepancyScale
     discrepancy: np.ndarray
     threshold: float
@@ -86,10 +87,6 @@ class DiscrepancySurrogate(OfProcesses):
     said: tuple[str, ...] = ()
 
     @property
-    def gp(self) -> GP:
-        return self.process
-
-    @property
     def equal(self) -> bool:
         """Whether all discrepancies are the same, but for rounding."""
         return bool(np.ptp(self.scale(self.discrepancy)) < 0.5)  # of what has an sd of 1
@@ -98,8 +95,8 @@ class DiscrepancySurrogate(OfProcesses):
     def transform(self) -> Transform:
         return self.scale.transform
 
-    @property
-    def log_likelihood(self) -> ThresholdLikelihood:
+    @cached_property
+    def log_likelihood(self) -> ThresholdLikelihood:  # pyright: ignore  nobody sets it
         threshold = (self.threshold - self.scale.location) / self.scale.spread
         width, resolution = (
             np.asarray(part / self.scale.spread) for part in (self.width, self.resolution)
@@ -134,7 +131,7 @@ class DiscrepancySurrogate(OfProcesses):
 
     def fantasize(self, u: np.ndarray) -> "DiscrepancySurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
-        return replace(self, process=fantasize(self.gp, u)) if len(u) else self
+        return replace(self, gp=fantasize(self.gp, u)) if len(u) else self
 
     def constants(self) -> dict[str, np.ndarray]:
         """The threshold, on the scale of g(Delta)."""
@@ -298,6 +295,7 @@ class DiscrepancyFamily(Family):
 
     name: ClassVar[str] = "discrepancy"
     acquisition: ClassVar[str] = "cautious"
+    has_lower_bound: ClassVar[bool] = True
 
     discrepancy: Discrepancy | None = None
     transform: str | None = None
@@ -319,9 +317,8 @@ class DiscrepancyFamily(Family):
 
     def measure(self, observed: np.ndarray, signals: Sequence[np.ndarray | None]) -> Measured:
         """Features are the signal, NaN where it has another shape than what was observed."""
-        features = super().measure(observed, signals).features
         distance = self.discrepancy or squared_difference()
-        return Measured(features, *evaluate(distance, observed, signals))
+        return Measured(flattened(observed, signals), *evaluate(distance, observed, signals))
 
     def search(
         self, data: TrainingData, key: np.ndarray, previous: DiscrepancySurrogate | None

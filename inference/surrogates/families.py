@@ -1,8 +1,9 @@
 """The family that a user means: an object, a name, or what the options belong to."""
 
 from dataclasses import fields
-from typing import Any
+from typing import Any, cast
 
+from ..arguments import check_called
 from .base import Family
 from .discrepancy import DiscrepancyFamily
 from .log_likelihood import LogLikelihoodFamily
@@ -22,13 +23,15 @@ def resolve(surrogate: str | Family | None, options: dict[str, Any]) -> Family:
     None is "signal", unless a discrepancy, or another option of that family alone, is given.
 
     Raises:
-        ValueError: unknown name, an option that the family has not, or without a name a
-            discrepancy and an option of "signal".
+        ValueError: unknown name, no `Family`, an option that the family has not, or without a
+            name a discrepancy and an option of "signal".
     """
-    if callable(getattr(surrogate, "learn", None)) and not isinstance(surrogate, str | type | None):
+    if Family in type(surrogate).__mro__:
         if options:
             raise ValueError(f"give {tuple(options)} to {surrogate!r} itself")
-        return surrogate
+        family = cast(Family, surrogate)
+        check_called("learn of surrogate", family.learn, "data", "key")
+        return family
     if surrogate is None:
         for_discrepancy = (_options("discrepancy") - _options("signal")) | {"discrepancy"}
         for_signal = _options("signal") - _options("discrepancy")
@@ -43,8 +46,8 @@ def resolve(surrogate: str | Family | None, options: dict[str, Any]) -> Family:
         options = {n: v for n, v in options.items() if v is not None or n in _options(surrogate)}
     if surrogate not in tuple(FAMILIES):
         raise ValueError(
-            f"surrogate must be one of {tuple(FAMILIES)}, an object with the method `learn`, or "
-            f"None, got {surrogate!r}"
+            f"surrogate must be one of {tuple(FAMILIES)}, an object of a class whose base is "
+            f"`Family`, or None, got {surrogate!r:.100}"
         )
     unknown = options.keys() - _options(surrogate)
     if unknown:

@@ -58,22 +58,35 @@ def given_noise(noise: ArrayLike | Covariance, output: Output) -> GivenNoise:
     Raises:
         ValueError: noise is none of these.
     """
-    samples = len(output.present)
     if isinstance(noise, Covariance):
         return _covariance(_at_samples(noise, output), output)
-    given = checked_array("noise", noise)
+    sds = given_sds(noise, output)
+    if sds is None:
+        return _covariance(checked_array("noise", noise), output)
+    variances = np.full(len(output.present), sds**2)[output.rank]
+    return _independent(output.average(variances) / output.counts)
+
+
+def given_sds(noise: ArrayLike, output: Output) -> np.ndarray | None:
+    """Sds of independent noise of the observed values, in the flattened order [n], or one of all
+    []; None for a covariance.
+
+    Raises:
+        ValueError: noise is none of these.
+    """
+    samples, given = len(output.present), checked_array("noise", noise)
     if given.shape == (samples, samples) == output.shape:
         raise ValueError(
             f"noise of shape {given.shape} may be sds or a covariance; give sds as [{samples}]"
         )
     if given.shape == (samples, samples):
-        return _covariance(given, output)
+        return None
     if given.ndim < 2 and given.size == 1:
-        sds = np.full(samples, given.item())
+        sds = given.reshape(())
     elif given.shape == output.shape:
-        sds = given.ravel()[output.present]
+        sds = given.ravel()[np.sort(output.present)]
     elif given.shape == (samples,):
-        sds = given[output.rank]
+        sds = given
     else:
         raise ValueError(
             f"noise must be a number, sds of shape {output.shape} as observed or [{samples}], or a "
@@ -85,7 +98,7 @@ def given_noise(noise: ArrayLike | Covariance, output: Output) -> GivenNoise:
         raise ValueError(
             f"noise must be finite and not negative where observed is finite, got {wrong[0]}"
         )
-    return _independent(output.average(sds**2) / output.counts)
+    return sds
 
 
 def _at_samples(noise: Covariance, output: Output) -> np.ndarray:

@@ -128,22 +128,18 @@ class LogLikelihoodSurrogate(OfProcesses):
     """See `learn`.
 
     Attributes:
-        level: The process of depths, and how they become log likelihoods.
+        log_likelihood: The process of depths, and how they become log likelihoods.
         values: Log likelihoods that were learned from [n].
         learned_at: How many were known when the hyperparameters were found.
     """
 
-    level: LevelLikelihood
+    log_likelihood: LevelLikelihood
     values: np.ndarray
     learned_at: int
 
     @property
-    def gp(self) -> GP:
-        return self.level.gp
-
-    @property
-    def log_likelihood(self) -> LevelLikelihood:
-        return self.level
+    def gp(self) -> GP:  # pyright: ignore  nobody sets it
+        return self.log_likelihood.gp
 
     @property
     def cautious(self) -> "LogLikelihoodSurrogate":
@@ -152,9 +148,10 @@ class LogLikelihoodSurrogate(OfProcesses):
         Where runs failed, what is extrapolated beyond their border must not outweigh
         log P(success).
         """
-        rise = np.full((), np.inf) if self.level.success is None else self.level.rise
-        level = self.level._replace(doubt=np.ones(()), optimism=np.zeros(()), rise=rise)
-        return replace(self, level=level)
+        found = self.log_likelihood
+        rise = np.full((), np.inf) if found.success is None else found.rise
+        cautious = found._replace(doubt=np.ones(()), optimism=np.zeros(()), rise=rise)
+        return replace(self, log_likelihood=cautious)
 
     def fantasize(self, u: np.ndarray) -> "LogLikelihoodSurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
@@ -162,13 +159,14 @@ class LogLikelihoodSurrogate(OfProcesses):
             return self
         noise = self.gp.data.spread
         usual = None if noise is None else np.full(len(u), np.median(noise))
-        return replace(self, level=self.level._replace(gp=fantasize(self.gp, u, usual)))
+        fantasized = fantasize(self.gp, u, usual)
+        return replace(self, log_likelihood=self.log_likelihood._replace(gp=fantasized))
 
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new log likelihood, its noise included, at u [n, d]: [n], [n]."""
         mean, variance = predict(self.gp, u)
         sd = np.sqrt(variance[0] + np.exp(2.0 * self.gp.hyper.log_noise[0]))
-        scale, values = self.level.scale, self.level.scale.values(mean[0])
+        scale, values = self.log_likelihood.scale, self.log_likelihood.scale.values(mean[0])
         return values, scale.spread * scale.folds(values) * sd
 
     def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
@@ -177,8 +175,8 @@ class LogLikelihoodSurrogate(OfProcesses):
 
     def constants(self) -> dict[str, np.ndarray]:
         """The best log likelihood, and the sd of one estimate's noise near it, in nats."""
-        noise = self.level.scale.spread * np.exp(self.gp.hyper.log_noise[0])
-        return {"best_log_likelihood": self.level.scale.top, "noise": noise}
+        noise = self.log_likelihood.scale.spread * np.exp(self.gp.hyper.log_noise[0])
+        return {"best_log_likelihood": self.log_likelihood.scale.top, "noise": noise}
 
     def described(self) -> list[str]:
         """The noise of a log likelihood near the best one."""
@@ -200,9 +198,9 @@ class LogLikelihoodSurrogate(OfProcesses):
     def _uncertain(self) -> float:
         """Share of the median likelihood's posterior where its log is not known to MAX_SD, or
         exceeds the best value by MAX_RISE."""
-        median = self.level._replace(doubt=np.zeros(()), optimism=np.zeros(()))
+        median = self.log_likelihood._replace(doubt=np.zeros(()), optimism=np.zeros(()))
         target = Target(median, self.u.shape[1])
-        population, scale = explore(np.random.default_rng(0), target), self.level.scale
+        population, scale = explore(np.random.default_rng(0), target), self.log_likelihood.scale
         mean, variance = (part[0] for part in predict(self.gp, ndtr(population.x)))
         unknown = scale.spread * np.sqrt(variance) > MAX_SD
         extrapolated = scale.values(mean) > scale.top + MAX_RISE
@@ -233,8 +231,8 @@ def learn(
         normal: Which parameters the kernel sees as normal scores [d], see `gp.process.coordinates`.
     """
     kept = previous if previous and len(u) < GROWTH * previous.learned_at else None
-    if kept is not None and values.max() < kept.level.scale.top + NEAR:
-        scale, learned_at = kept.level.scale, kept.learned_at
+    if kept is not None and values.max() < kept.log_likelihood.scale.top + NEAR:
+        scale, learned_at = kept.log_likelihood.scale, kept.learned_at
         gp = condition(kept.gp.hyper, _data(u, values, sd, scale, normal))
     else:
         fitted = []
@@ -243,8 +241,8 @@ def learn(
             fitted.append((condition(maximum_a_posteriori(data), data), scale))
         gp, scale = max(fitted, key=lambda one: _score(one[0], one[1], values))
         learned_at = len(u)
-    level = LevelLikelihood(gp, scale, doubt=np.zeros(()), optimism=np.asarray(OPTIMISM))
-    return LogLikelihoodSurrogate(level, values, learned_at)
+    hoped = LevelLikelihood(gp, scale, doubt=np.zeros(()), optimism=np.asarray(OPTIMISM))
+    return LogLikelihoodSurrogate(hoped, values, learned_at)
 
 
 def _scales(values: np.ndarray) -> list[LogLikelihoodScale]:
@@ -327,7 +325,7 @@ class LogLikelihoodFamily(Family):
         values, sd = -data.discrepancy, data.features[:, 0]
         learned = learn(data.u, values, sd, previous, data.normal)
         success = learn_success(data.runs, data.normal)
-        return replace(learned, level=learned.level._replace(success=success))
+        return replace(learned, log_likelihood=learned.log_likelihood._replace(success=success))
 
     def learn(self, data: TrainingData, key: np.ndarray) -> LogLikelihoodSurrogate:
         return self.search(data, key, None).cautious

@@ -1,4 +1,4 @@
-"""What surrogates share that rest on Gaussian processes."""
+"""Base of surrogates that rest on Gaussian processes."""
 
 from typing import Any
 
@@ -12,22 +12,18 @@ from .success import log_success
 
 
 class OfProcesses(Surrogate):
-    """A surrogate of one process or several, whose last points may be fantasised."""
+    """A surrogate of one process or several, whose last points may be fantasised.
 
-    @property
-    def gp(self) -> GP:
-        """The processes."""
-        raise NotImplementedError
+    Attributes:
+        gp: The processes.
+        log_likelihood: A named tuple of arrays that is called with u [n, d]. Among its fields are
+            `success` (see `learn_success`) and `doubt`, the part of the latent variance that
+            counts. Its method `second_moment(u, spread)` is log E[L(u)^2] [n] over latent values
+            that vary with their variance, or [n, ...] with `spread` [n, ..., k].
+    """
 
-    @property
-    def log_likelihood(self) -> Any:  # pyright: ignore  nobody sets it
-        """A named tuple of arrays that is called with u [n, d].
-
-        Among its fields are `success` (see `learn_success`) and `doubt`, the part of the latent
-        variance that counts. Its method `second_moment(u, spread)` is log E[L(u)^2] [n] over
-        latent values that vary with their variance, or [n, ...] with `spread` [n, ..., k].
-        """
-        raise NotImplementedError
+    gp: GP
+    log_likelihood: Any
 
     @property
     def u(self) -> np.ndarray:  # pyright: ignore  nobody sets it

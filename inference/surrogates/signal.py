@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -103,11 +104,11 @@ class SignalSurrogate(OfProcesses):
     scale: OutputScale = Plain(np.zeros(0), None)
 
     @property
-    def gp(self) -> GP:
+    def gp(self) -> GP:  # pyright: ignore  nobody sets it
         return self.emulator.gp
 
-    @property
-    def log_likelihood(self) -> SignalLikelihood:
+    @cached_property
+    def log_likelihood(self) -> SignalLikelihood:  # pyright: ignore  nobody sets it
         found = likelihood_of(self.emulator, self.reduced, self.box)
         return found._replace(success=self.success)
 
@@ -193,10 +194,11 @@ class SignalSurrogate(OfProcesses):
         """Whether parameters and noise explain what was observed."""
         if not self.emulator.basis.used and self.emulator.size is None:
             return True
-        return not (self._missed() or self._smooth() or self._outside())
+        return not (self._missed() or self._smooth() or self._outside() or self.unreached)
 
     def warnings(self, *, confirmed: bool = False) -> list[str]:
-        """Warnings of the emulator's own checks, unless it is confirmed, and of the data."""
+        """Warnings of the emulator's own checks, unless it is confirmed, of noise and misfit, and
+        of the observed values."""
         repeats, sized = self.emulator.repeats, self.emulator.size is not None
         if self.emulator.basis.used == 0 and not sized:
             if self.emulator.equal:
@@ -218,7 +220,7 @@ class SignalSurrogate(OfProcesses):
         return said + self._of_data()
 
     def _of_data(self) -> list[str]:
-        """Warnings of the observed values themselves."""
+        """Warn of positive values that span decades, and of a number that no run reaches."""
         ranges = warnings.range_warnings(self.scale.observed) if self.known is None else []
         return ranges + self.unreached
 

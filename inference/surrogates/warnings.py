@@ -187,8 +187,8 @@ def history_warnings(history: History) -> list[str]:
     said = []
     if failed > FAILED_SHARE * told:
         said.append(
-            f"{failed} of {told} simulations failed: the fit rests on {succeeded}; the last "
-            f"error: {history.last_error}"
+            f"{failed} of {told} simulations failed: the fit rests on {succeeded}"
+            f"{history.last_error}"
         )
     if contradicting:
         said.append(

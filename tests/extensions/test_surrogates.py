@@ -14,7 +14,7 @@ import pytest
 from bolfi_liquids.inference.acquisition.rules import RULES
 from bolfi_liquids.inference.sampling.nuts import padded
 from bolfi_liquids.inference.sobol import sobol
-from bolfi_liquids.inference.surrogates import Surrogate
+from bolfi_liquids.inference.surrogates import Family, Surrogate
 from bolfi_liquids.inference.surrogates.families import FAMILIES
 from bolfi_liquids.inference.surrogates.processes import OfProcesses
 
@@ -224,9 +224,14 @@ def test_the_engines_own_tell_of_themselves(learned):
 
 
 @pytest.mark.parametrize("rule", RULES)
-def test_every_rule_chooses_by_it(learned, rule):
-    """Different points, the same for a key; only "lcb" is the paper's surrogate's own."""
-    if rule == "lcb" and not hasattr(learned, "lower_bound"):
+def test_every_rule_chooses_by_it(family, learned, rule):
+    """Different points, the same for a key; "lcb" where the surrogate has a lower bound."""
+    if rule == "lcb":
+        assert family.has_lower_bound == hasattr(learned, "lower_bound")
+    if rule == "lcb" and not family.has_lower_bound:
+        data = None if family.name == "log_likelihood" else OBSERVED
+        with pytest.raises(ValueError, match="'lcb' needs"):
+            inference.Bolfi(PRIOR, data, surrogate=family, acquisition=rule)
         return
     before = jax.tree.leaves(learned.log_likelihood)
     u = RULES[rule]()(KEYS[0], learned, 2)
@@ -235,6 +240,37 @@ def test_every_rule_chooses_by_it(learned, rule):
     np.testing.assert_array_equal(u, RULES[rule]()(KEYS[0], learned, 2))
     assert not np.array_equal(u, RULES[rule]()(KEYS[1], learned, 2))
     assert same(before, jax.tree.leaves(learned.log_likelihood))  # it chooses, and changes nothing
+
+
+def test_what_is_no_family_is_refused_before_it_learns():
+    class WithoutBase:
+        def learn(self, data, key): ...
+
+    class WithoutKey(Family):
+        def learn(self, data): ...
+
+    for given, message in {
+        WithoutBase(): "an object of a class whose base is `Family`",
+        WithoutKey: "an object of a class whose base is `Family`",
+        WithoutKey(): r"learn of surrogate must be called with \(data, key\)",
+    }.items():
+        with pytest.raises(ValueError, match=message):
+            inference.Bolfi(PRIOR, OBSERVED, surrogate=given)
+
+
+def test_a_family_cannot_change_the_signals_that_it_measures():
+    class Writing(type(example())):
+        def measure(self, observed, signals):
+            for signal in signals:
+                signal[:] = 0.0
+            return super().measure(observed, signals)
+
+    signals = simulate(PRIOR.from_unit(POINTS), range(3))
+    for told in (signals, list(signals)):
+        engine = inference.Bolfi(PRIOR, OBSERVED, surrogate=Writing())
+        with pytest.raises(ValueError, match="read-only"):
+            engine.tell(PRIOR.from_unit(POINTS), told)
+    assert signals.flags.writeable and signals.all()
 
 
 def test_a_fit_rests_on_it(fit, family):

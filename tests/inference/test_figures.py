@@ -51,6 +51,8 @@ def test_a_surrogate_of_the_discrepancy_draws_no_band(line_fit):
 def test_too_few_axes_are_refused(fit):
     with pytest.raises(ValueError, match="1 channels, got 0"):
         fit.plot_predictive(axes=[])
+    with pytest.raises(ValueError, match="must be what `sample` returned or None, got 3"):
+        fit.plot_predictive(3)
 
 
 def test_objects_tell_what_they_hold(fit, prior, observed):

@@ -200,6 +200,7 @@ def test_losses_as_output_are_sent_to_fit_losses():
 
     fit = inference.fit(simulate, DECAY, [0.0], budget=40, confirm=0, **QUIET)
     assert any("fit_losses" in said for said in fit.warnings)
+    assert fit.status != "fitted"
 
 
 @pytest.mark.parametrize(("sign", "said"), [(1.0, True), (-1.0, False)])

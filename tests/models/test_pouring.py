@@ -2,7 +2,6 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from bolfi_liquids.models.pouring import _checked_rate
 
 from bolfi_liquids import models
 
@@ -81,8 +80,10 @@ def test_cups_without_a_contact_angle_are_taken_at_60_degrees(tmp_path, cups):
 def test_every_angular_velocity_of_a_cups_file_is_one_that_pours_take(tmp_path):
     path = tmp_path / "cups.toml"
     path.write_text(bundled_text().replace("[30.0, 180.0]", "[0.573, 1718.8]", 1))
-    for rate in models.Cups.from_toml(path).angular_velocity_range:
-        assert _checked_rate(rate, 1) == rate
+    cups, liquid = models.Cups.from_toml(path), models.Liquid(1.0, 0.0, 1000.0)
+    for rate in cups.angular_velocity_range:
+        with pytest.raises(ValueError, match="particles"):  # nothing is wrong with the rate
+            models.landings(liquid, rate, cups, [0], -1)
 
 
 def bundled_text():

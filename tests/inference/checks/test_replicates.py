@@ -213,6 +213,23 @@ def test_a_simulator_that_fails_is_not_the_pipelines_fault():
             check(made)
 
 
+def test_replicates_beside_unusable_ones_are_kept_and_these_are_tried_again(tmp_path):
+    def at_times_no_signal(theta, seeds):
+        return np.zeros(()) if theta["a"][0] > 0.5 else simulate(theta, seeds)
+
+    def made(told):
+        how = {"draws": 15, "independent": True, "store": tmp_path / "r.sqlite"}
+        given = Guess(), at_times_no_signal, PRIOR, 30
+        return inference.replicates(*given, progress=told.append, **how)
+
+    ran, ran_again = [], []
+    first, again = made(ran), made(ran_again)
+    assert 4 < len(first.failed) < 26 and first.errors == again.errors
+    assert {one.error.kind for one in again.failed} == {FailureKind.UNUSABLE}
+    assert len(ran) == 30 and len(ran_again) == len(first.failed)
+    np.testing.assert_array_equal(first.draws, again.draws)
+
+
 def test_a_simulator_that_takes_too_long_costs_its_replicate():
     def slow(theta, seeds):
         time.sleep(0.5 * (theta["a"][0] > 0))

@@ -156,10 +156,16 @@ def test_compiles_once_for_all_fits_and_lengths(line_fit, prior, observed, simul
 
 
 @pytest.mark.slow
-def test_nuts_refuses_a_likelihood_of_numpy_alone():
-    target = Target(lambda u: -0.5 * np.sum(((np.asarray(u) - 0.45) / 0.03) ** 2, 1), 2)
+@pytest.mark.parametrize("known", [np.asarray, lambda u: np.array([[float(u[0, 0]), 0.5]])])
+def test_nuts_refuses_a_likelihood_of_numpy_alone(known):
+    target = Target(lambda u: -0.5 * np.sum(((known(u) - 0.45) / 0.03) ** 2, 1) + 0.0 * u[:, 0], 2)
     with pytest.raises(ValueError, match="'nuts' needs"):
         sample("nuts", target, SMALL)
+
+
+@pytest.mark.slow
+def test_emcee_needs_numpy_alone():
+    target = Target(lambda u: -0.5 * np.sum(((np.asarray(u) - 0.45) / 0.03) ** 2, 1), 2)
     assert not sample("emcee", target).found
 
 

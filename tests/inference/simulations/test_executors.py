@@ -302,6 +302,13 @@ def test_an_address_where_nobody_answers(prior, observed, simulate):
         inference.fit(simulate, prior, observed, executor="tcp://127.0.0.1:9")
 
 
+@pytest.mark.parametrize("bank", [3, ""])
+def test_a_bad_bank_is_refused_before_a_scheduler_is_waited_for(prior, observed, simulate, bank):
+    where = {"bank": bank, "executor": "tcp://127.0.0.1:1"}
+    with pytest.raises(ValueError, match="bank must be the path of a file or a SimulationBank"):
+        inference.fit(simulate, prior, observed, budget=8, **where)
+
+
 def test_without_dask_the_extra_is_named(prior, observed, simulate, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ImportError, match=r"pip install 'bolfi-liquids\[dask\]'"):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
 from bolfi_liquids.inference.simulations import BatchSimulator, Compute, Job, run_missing
-from bolfi_liquids.inference.simulations.job import run_batch
+from bolfi_liquids.inference.simulations.job import for_engine, run_batch
 
 
 class Marching:
@@ -53,6 +53,21 @@ def test_a_run_that_fails_costs_only_itself():
 def test_what_is_no_number_of_simulations_is_refused(together):
     with pytest.raises(ValueError, match="together"):
         BatchSimulator(Marching().simulate, together)
+
+
+@pytest.mark.parametrize(
+    ("simulate", "options"),
+    [
+        (Marching().simulate, {"vectorised": False, "together": 4}),
+        (Marching().simulate, {"vectorised": False, "together": "four"}),
+        (BatchSimulator(Marching().simulate), {"together": "four"}),
+        (BatchSimulator(Marching().simulate), {"time_limit": max}),
+        (BatchSimulator(Marching().simulate), {"vectorised": False}),
+    ],
+)
+def test_what_contradicts_a_simulator_is_refused(simulate, options):
+    with pytest.raises(ValueError, match="leave"):
+        for_engine(simulate, **options)
 
 
 @pytest.mark.parametrize("neutral", [3, "drag", ["drag"]])
