@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._lazy import stats, xr
-from ..arguments import checked_array
+from ..arguments import check_flag, checked_array
 from .finished_replicates import Judged, Quantity, Replicates, check_judged, table
 
 if TYPE_CHECKING:
@@ -164,6 +164,7 @@ def coverage(
     if nominal.ndim != 1 or nominal.size == 0 or not ((nominal > 0) & (nominal < 1)).all():
         raise ValueError(f"levels must lie between 0 and 1, got {levels}")
     check_judged(made, alpha)
+    check_flag("conservative", conservative)
     values = made.values(quantities)
     quantiles = made.quantiles(values)
     covered = np.sum(2 * np.abs(quantiles - 0.5) <= nominal[:, None, None], axis=1)

@@ -13,6 +13,7 @@ import matplotlib
 import numpy as np
 import numpyro.distributions as dist
 import pytest
+from bolfi_liquids.inference.criticism import Extension
 from bolfi_liquids.inference.simulations import Simulation
 
 from bolfi_liquids import inference
@@ -62,7 +63,9 @@ def cases():
     of_fit = {"simulate": simulate, "prior": prior, "observed": OBSERVED}
     row = {"identity": "", "theta": {"a": 0.5}, "seed": 0}
     quick = {"n": 8, "draws": 7, "independent": True, "progress": False}
-    check = {"of": pipeline, "simulate": simulate, "prior": prior}
+    of_pipeline = {"pipeline": pipeline, "simulate": simulate, "prior": prior, **quick}
+    made = inference.replicates(**of_pipeline)
+    by_fit = inference.fit(**of_fit, budget=4, noise=0.1, progress=False, warn=False)
     return {
         "fit": (inference.fit, {**of_fit, "budget": 4, "progress": False}),
         "fit_losses": (
@@ -126,11 +129,15 @@ def cases():
             inference.shared_design,
             {"simulate": simulate, "prior": prior, "n": 4, "progress": False},
         ),
-        "replicates": (
-            inference.replicates,
-            {"pipeline": pipeline, "simulate": simulate, "prior": prior, **quick},
+        "replicates": (inference.replicates, of_pipeline),
+        **{
+            name: (getattr(inference, name), {"made": made}) for name in ("sbc", "coverage", "tarp")
+        },
+        "Fit.check": (by_fit.check, {**quick, "sampling": {"sampler": "quadrature"}}),
+        "Fit.criticise": (
+            by_fit.criticise,
+            {"extensions": {"more": Extension(dist.Normal(0.0, 1.0), 0.0)}, "bank": ":memory:"},
         ),
-        **{name: (getattr(inference, name), check | quick) for name in ("sbc", "coverage", "tarp")},
     }
 
 
@@ -183,7 +190,7 @@ def test_an_argument_that_makes_no_sense_is_refused_by_its_name(cases, name, arg
 def test_each_case_works_with_what_it_is_given(cases):
     """Else it might be refused for another reason."""
     for name, (call, good) in cases.items():
-        if name not in ("sbc", "coverage", "tarp", "Bolfi.tell"):
+        if name != "Bolfi.tell":
             call(**good)
 
 
