@@ -109,7 +109,8 @@ class Fit(Displayed):
         if self.made_by is None:
             raise ValueError(
                 "the fit has no simulator: `fit` did not make it from one, or it was copied or "
-                "pickled; give the simulator to inference.replicates or criticism.criticise"
+                "pickled; check inference.FitPipeline(simulate, prior) by inference.replicates, "
+                "or criticise a criticism.Experiment(simulate, observed, noise)"
             )
         return self.made_by
 

@@ -324,7 +324,8 @@ class Run:
         try:
             tree = read_result(path)
         except (OSError, ValueError):
-            return None, f"{path.name} is damaged"
+            lost = "" if step == "calibrate" else ", and the options that it was made with are lost"
+            return None, f"{path.name} is damaged{lost}"
         why = self._stale(step, json.loads(tree.attrs["made_from"]))
         return (None, f"{path.name} {why}") if why else (tree, "")
 
@@ -341,8 +342,9 @@ class Run:
         after = key_of(calibration) if step == "criticise" else self.posterior_key()
         if made_from["after"] != after:
             return "was made from another posterior"
-        if step == "pour" and made_from["given"] != digest_of_pours(self.path):
-            return "was made with other given pours"
+        if step == "pour" and made_from["given"] != (given := digest_of_pours(self.path)):
+            which = "other given pours" if given else "given pours that are missing"
+            return f"was made with {which}"
         return ""
 
     def _check_generation(self) -> None:

@@ -277,7 +277,7 @@ def test_a_result_is_current_as_long_as_what_it_was_made_from_is_there(run):
     assert run.result("pour") is None and "posterior" in run.why_not("pour")
     poured(run, run.posterior_key(), given="of other pours")
     assert run.result("pour") is None and "given pours" in run.why_not("pour")
-    with pytest.raises(InputError, match="given pours; run.*: bolfi-liquids pour "):
+    with pytest.raises(InputError, match="given pours.*; run.*: bolfi-liquids pour "):
         run.required("pour")
 
 
