@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from functools import partial
 from inspect import signature
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from .arguments import (
     checked_mapping,
 )
 from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
-from .checks.of_fit import check_sampling
+from .checks.of_fit import check_sampling, fit_and_sample
 from .checks.one_replicate import LogDensity
 from .loop import fit
 from .prior import Prior, checked_prior
@@ -87,10 +88,8 @@ class FitPipeline:
         object.__setattr__(self, "options", options)
 
     def __call__(self, observed: np.ndarray, seed: int) -> "tuple[xr.DataTree, LogDensity]":
-        options = {"progress": False, "warn": self.warn, **self.options}
-        made = fit(self.simulate, self.prior, observed, budget=self.budget, seed=seed, **options)
-        sampling = {"warn": self.warn, **self.sampling}
-        return made.sample(seed=seed, **sampling), made.log_prob
+        own = partial(fit, self.simulate, self.prior, observed, budget=self.budget)
+        return fit_and_sample(own, self.options, self.sampling, seed=seed, warn=self.warn)
 
 
 def shared_design(  # noqa: PLR0913  one flat place for what defines a design

@@ -1,7 +1,8 @@
 """Checks of the pipeline that made a fit."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from inspect import signature
 from typing import Any
 
@@ -87,9 +88,21 @@ class Refit:
 
     def __call__(self, observed: np.ndarray, seed: int) -> "tuple[xr.DataTree, LogDensity]":
         of = self.recipe
-        how = {"budget": of.budget, "seed": seed, "progress": False, "warn": False, **of.options}
-        made = of.fit(of.simulate, self.prior, observed, **how)
-        return made.sample(seed=seed, **{"warn": False, **self.sampling}), made.log_prob
+        fit = partial(of.fit, of.simulate, self.prior, observed, budget=of.budget)
+        return fit_and_sample(fit, of.options, self.sampling, seed=seed, warn=False)
+
+
+def fit_and_sample(
+    fit: Callable[..., Fit],
+    options: Mapping[str, Any],
+    sampling: Mapping[str, Any],
+    *,
+    seed: int,
+    warn: bool,
+) -> "tuple[xr.DataTree, LogDensity]":
+    """Draws and density of a pipeline; `warn` holds where options and sampling say nothing."""
+    made = fit(seed=seed, **{"progress": False, "warn": warn, **options})
+    return made.sample(seed=seed, **{"warn": warn, **sampling}), made.log_prob
 
 
 def check_sampling(options: Mapping[str, Any]) -> None:
