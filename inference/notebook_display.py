@@ -1,5 +1,6 @@
 """Results as text, and as HTML in a notebook."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from html import escape
 
@@ -7,11 +8,12 @@ Rows = Sequence[tuple[str, str]]
 """(what, its value), top to bottom."""
 
 
-class Displayed:
+class Displayed(ABC):
     """Shown as a title, the name of its class, and a row for each value."""
 
+    @abstractmethod
     def _shown(self) -> Rows:
-        raise NotImplementedError
+        """The rows."""
 
     def __repr__(self) -> str:
         rows = (f"{what}: {value}" for what, value in self._shown())

@@ -4,6 +4,7 @@ Every rule scores in logs, so that nothing underflows far from the posterior, an
 point of a batch before it chooses the next (see `fantasize` of the surrogates).
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -118,14 +119,14 @@ def log_moments(surrogate: Surrogate, u: np.ndarray) -> tuple[np.ndarray, np.nda
     return first, 2.0 * first + excess + np.log(-np.expm1(-excess))
 
 
-class BestCandidates:
+class BestCandidates(ABC):
     """The candidates of highest score, each fantasized before the next is scored."""
 
+    @abstractmethod
     def _score(
         self, rng: np.random.Generator, surrogate: Surrogate, found: Candidates
     ) -> np.ndarray:
         """Log scores [CANDIDATES]."""
-        raise NotImplementedError
 
     def __call__(self, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
         """n different points u [n, d]; scores are lowered by the log chance that a run succeeds."""

@@ -1,6 +1,7 @@
 """Finished replicates as one value, from which every check is computed."""
 
 import zlib
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -163,13 +164,13 @@ class Replicates:
         return xr.Dataset(variables, {"replicate": self.index}, attributes)
 
 
-class Judged:
+class Judged(ABC):
     """The result of a check; it is `ok` unless it warns."""
 
     @property
+    @abstractmethod
     def warnings(self) -> list[str]:
         """Warnings about the pipeline."""
-        raise NotImplementedError
 
     @property
     def ok(self) -> bool:
