@@ -1,7 +1,7 @@
 """What lies between a simulator's mean output and the data, besides the simulator's own noise."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -14,6 +14,7 @@ DRAWS = 400
 ROUNDING = 1e-12  # of the largest value: what varies less does not vary
 
 
+@runtime_checkable
 class Noise(Protocol):
     """Gaussian noise whose size may be uncertain."""
 
@@ -28,7 +29,7 @@ class Noise(Protocol):
 
 def check_noise(name: str, noise: object) -> None:
     """Raise ValueError unless it is a `Noise`."""
-    if not (hasattr(noise, "covariance") and hasattr(noise, "draw")):
+    if not isinstance(noise, Noise):
         raise ValueError(f"{name} must be a Noise, such as KnownNoise(0.01), got {noise!r:.100}")
 
 

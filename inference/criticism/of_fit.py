@@ -86,7 +86,7 @@ def noise_of(fit: Fit) -> Noise | None:
     given: Any = family.noise
     if given is None:
         return _estimated(fit)
-    if hasattr(given, "covariance") and hasattr(given, "draw"):
+    if isinstance(given, Noise):
         return given
     by_mean = law_of(given) is not None
     sds = None if by_mean else given_sds(given, family.view(fit.observed).output)
