@@ -144,11 +144,13 @@ def usual_for(
     same = [only is not None and same_experiment(one.recording, only) for one in clean]
     # the whole recording tells white noise better than the short rest tells correlated noise
     noises = [KnownNoise(sensor_noise(one.recording.inclination)) for one in clean]
-    away = apart([one.viscosity for one in clean], viscosity, stirring.least_viscosity)
-    return usual_residual([one.residual for one in clean], noises, same, away)
+    distances = regime_distance(
+        [one.viscosity for one in clean], viscosity, stirring.least_viscosity
+    )
+    return usual_residual([one.residual for one in clean], noises, same, distances)
 
 
-def apart(
+def regime_distance(
     known: Sequence[float | None], viscosity: float | None, least: float
 ) -> NDArray[np.float64]:
     """How far liquids are from another one, as simulator errors go, shape (n,).

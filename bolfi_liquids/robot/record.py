@@ -108,7 +108,7 @@ def stir_session(
     Raises:
         InputError: A camera is a file.
         RigError: The person did not agree, or something cannot be used.
-        SessionStopped: The arm was stopped; the message says what is left.
+        SessionStopped: The arm was stopped; the message says what was recorded.
     """
     from ..hardware import HiddenLiquid, emulated
     from ..hardware.motion import above_cup
@@ -184,7 +184,7 @@ def save_on_stop(directory: Path) -> Iterator[None]:
     """Save the frames taken before a stop as a recording.
 
     Raises:
-        SessionStopped: It was stopped, or interrupted; the message says what is left.
+        SessionStopped: It was stopped, or interrupted; the message says what was recorded.
     """
     from ..hardware import SessionInterrupted, SessionStopped
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bolfi_liquids.calibration.model_error import Clean, apart, usual_for
+from bolfi_liquids.calibration.model_error import Clean, regime_distance, usual_for
 from bolfi_liquids.calibration.stirs import camera_noise, held_out_noise, stir_experiment
 from bolfi_liquids.criticism.inputs import check_effects, open_inputs
 from bolfi_liquids.errors import Argument, InputError
@@ -232,11 +232,11 @@ def test_clean_recordings_of_the_same_path_say_where_it_errs(stirred):
 
 def test_liquids_are_as_far_apart_as_their_viscosities():
     """In doublings; all are alike where one is unknown."""
-    np.testing.assert_allclose(apart([0.1, 0.4, 1.6], 0.4, 0.005), [-2.0, 0.0, 2.0])
-    assert (apart([0.001, 0.1], None, 0.005) == 0.0).all()
-    assert (apart([None, 1.0], 1.0, 0.005) == 0.0).all()
+    np.testing.assert_allclose(regime_distance([0.1, 0.4, 1.6], 0.4, 0.005), [-2.0, 0.0, 2.0])
+    assert (regime_distance([0.001, 0.1], None, 0.005) == 0.0).all()
+    assert (regime_distance([None, 1.0], 1.0, 0.005) == 0.0).all()
     # water is water, wherever below the least viscosity it was fitted
-    np.testing.assert_allclose(apart([3e-4, 0.004, 0.01], 0.001, 0.005), [0.0, 0.0, 1.0])
+    np.testing.assert_allclose(regime_distance([3e-4, 0.004, 0.01], 0.001, 0.005), [0.0, 0.0, 1.0])
 
 
 @pytest.mark.parametrize("option", ["pours", "held_out_pours"])
