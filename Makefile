@@ -87,8 +87,7 @@ paper: $(RUNS)
 	$(BIN)/python -m tests.benchmarks.paper $(FIGURES) $(if $(QUICK),--quick)
 
 # ELFI and sbi cannot be installed beside us, nor beside each other: each has its own old Python.
-# SPlisHSPlasH, for tests/benchmarks/fluid.py, is kept apart like them.
-peers: $(PEERS)/elfi/.installed $(PEERS)/sbi/.installed $(PEERS)/pysplishsplash/.installed
+peers: $(PEERS)/elfi/.installed $(PEERS)/sbi/.installed
 
 $(PEERS)/%/.installed: tests/benchmarks/peers/%.txt
 	@python=; \

@@ -17,6 +17,7 @@ from _pytest.runner import runtestprotocol
 APPLICATION = "bolfi_liquids"
 POURED = {"pour", "frames"}  # its fixtures that take a minute where nothing is compiled yet
 SIMULATED = {"calibration", *POURED}
+MAINTAINED = {"benchmarks", "physics"}  # folders of what only maintainers run, with its tests
 SIMULATING = ("models", "physics", "simulation")  # folders of tests
 CONTROLLED = {"arm", "emulator", "robot"}  # fixtures of tests that talk to an emulated controller
 MOST_REPEATS = 3  # of a session; with more of them, tests hide what fails
@@ -45,7 +46,8 @@ def pytest_collection_modifyitems(items):
     """What simulates comes first: of two workers one then compiles the kernels, not both."""
     items.sort(key=lambda item: not _simulates(item))
     for item in items:
-        if POURED & set(item.fixturenames) and _folders(item)[0] == APPLICATION:
+        folder = _folders(item)[0]
+        if folder in MAINTAINED or (POURED & set(item.fixturenames) and folder == APPLICATION):
             item.add_marker("slow")
 
 

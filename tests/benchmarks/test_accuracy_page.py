@@ -67,16 +67,6 @@ def test_records_of_stirs_and_pours_are_kept_by_kind():
     ]
 
 
-def test_comparisons_of_one_tolerance_and_unit_share_a_row():
-    rows = accuracy_page.case_rows(
-        case(row("a [mm]", 0.5, 1.0), row("b [mm]", -0.25, 1.0), row("c [s]", 0.1, 1.0))
-    )
-    assert [one["count"] for one in rows] == ["2", "1"]
-    assert rows[0]["errors"] == "-0.25 to 0.5 mm" and rows[0]["farthest"] == "a"
-    (relative,) = accuracy_page.case_rows(case(row("a [mm]", -0.083, 0.1), unit="relative"))
-    assert relative["errors"] == "-8.3 %" and relative["tolerance"] == "10 %"
-
-
 def test_what_misses_its_bar_is_listed(measured):
     changed = copy.deepcopy(measured)
     changed["physics"]["cases"] = {"still": case(row("speed [m/s]", 0.2, 0.1))}
@@ -84,17 +74,6 @@ def test_what_misses_its_bar_is_listed(measured):
     listed = accuracy_page.page(changed).partition("## Bars that are missed")[2]
     listed = listed.partition("\n## ")[0]
     assert "still: speed" in listed and "gel_v10" in listed
-
-
-def test_another_file_is_refused():
-    with pytest.raises(ValueError, match="no record of a kind of case, stir"):
-        accuracy_page.kept([{"created": "2026", "cases": {}}])
-
-
-def test_records_of_two_models_are_refused():
-    rest = case(row("speed [m/s]", 0.02, 0.1))
-    with pytest.raises(ValueError, match="physics of the models 1, 2: repeat the older"):
-        accuracy_page.kept([record("case", model, **rest) for model in "12"])
 
 
 @pytest.mark.parametrize("kind", accuracy_page.KINDS)

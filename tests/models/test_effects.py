@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import numpyro.distributions as dist
 import pytest
-from bolfi_liquids.inference.distributions import Univariate
 from bolfi_liquids.models.effect_coefficients import acting_in, changed_signal
 from jax import random
 
@@ -61,38 +60,6 @@ def pour(cups):
     return run
 
 
-# an effect in the liquid compiles a scene: one is enough for continuous integration
-IN_CI = ("shear_thinning",)
-
-
-def when(effect):
-    """How often an effect is tried alone; one that is new, in the long tests at the least."""
-    if effect.acts_in != "liquid":
-        return []
-    return pytest.mark.slow if effect.name in IN_CI else pytest.mark.minutes
-
-
-ALONE = [
-    pytest.param(name, marks=when(effect))
-    for name, effect in models.EFFECTS.items()
-    if "stir" in effect.scenes
-]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ALONE)
-def test_a_neutral_coefficient_leaves_every_bit(stir, name):
-    base, neutral = stir(), models.EFFECTS[name].neutral
-    assert np.isfinite(base).all() and np.ptp(base[:, -1], axis=0).min() > 0
-    np.testing.assert_array_equal(stir({name: neutral}), base)
-    changed = coefficient(name)
-    mixed = stir({name: [neutral, changed, neutral]})
-    np.testing.assert_array_equal(mixed[[0, 2]], base[[0, 2]])
-    assert np.abs(mixed[1] - base[1]).max() > 1e-5
-    alone = stir({name: changed}, slice(1, 2))
-    np.testing.assert_array_equal(alone[0], mixed[1])
-
-
 @pytest.mark.minutes
 def test_all_effects_together_stay_neutral_where_they_are(stir):
     neutral = {name: effect.neutral for name, effect in models.EFFECTS.items()}
@@ -132,16 +99,6 @@ def test_a_pour_keeps_every_bit_where_coefficients_are_neutral(pour):
     base = pour()
     np.testing.assert_array_equal(mixed[:, [0, 2]], base[:, [0, 2]])
     assert (mixed[:, 1] != base[:, 1]).any()
-
-
-@pytest.mark.parametrize("effect", models.EFFECTS.values(), ids=models.EFFECTS)
-def test_every_effect_explains_itself(effect):
-    assert models.EFFECTS[effect.name] is effect
-    assert effect.parameter == effect.name
-    assert effect.text.endswith(".") and len(effect.source) > 20
-    assert effect.prior is effect.prior
-    # as the engine reads it: numpyro itself warns of the zero of a half-normal
-    assert np.isfinite(Univariate(effect.prior).log_prob(np.asarray(effect.neutral)))
 
 
 @pytest.mark.slow

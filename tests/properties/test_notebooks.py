@@ -37,7 +37,7 @@ def draw_least_figures(out):
         drawn_particles=300,
         pours=24,
     )
-    names = [name for name in FIGURES if name not in ("strokes", "adhesion")]
+    names = [name for name in FIGURES if name != "strokes"]
     with processes() as executor:
         for _ in draw_figures(names, out, least, executor):
             pass

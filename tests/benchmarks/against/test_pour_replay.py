@@ -11,7 +11,6 @@ from .pour_replay import (
     LANDING,
     RETAINED,
     RMS,
-    cell_width,
     pour_panel,
     pour_rows,
     repeat_pours,
@@ -86,12 +85,6 @@ def test_the_retained_fraction_has_a_bar_where_the_reference_resolves_it(poured,
     assert slow.retained_error == pytest.approx(more, abs=5e-3)  # shown, though not judged
 
 
-def test_what_the_reference_does_not_tell_is_not_judged(poured, off):
-    """The second table has no landings."""
-    _, rows = judged(poured["thick_contact_110"], off())
-    assert set(rows) == {RMS, RETAINED, EXCESS}
-
-
 def test_a_failed_simulation_fails(poured, off):
     def fails(liquid, seeds, cell):
         landed = off()(liquid, seeds, cell)
@@ -101,17 +94,6 @@ def test_a_failed_simulation_fails(poured, off):
     (slow, fast), rows = judged(poured["thick_contact_60"], fails)
     assert not any(row.passed for row in rows.values())
     assert np.isfinite(slow.rms) and np.isnan(fast.rms) and np.isnan(fast.excess)
-
-
-def test_the_timed_pours_are_all_after_one_of_another_seed(poured, off):
-    calls = []
-
-    def simulate(liquid, seeds, cell):
-        calls.append((len(liquid.pours), list(seeds), cell))
-        return off()(liquid, seeds, cell)
-
-    repeat_pours(poured["thin_contact_60"], simulate, cell=0.004)
-    assert calls == [(1, [1], 0.004), (2, [0, 0], 0.004)]
 
 
 def test_the_true_liquid_is_poured_from_a_cup_that_it_wets_as_in_the_reference(poured, monkeypatch):
@@ -140,9 +122,3 @@ def test_the_fluid_repeats_pours_in_cells_of_two_sizes(poured):
     for landed in (coarse, fine):
         assert np.isfinite(landed.retained).all()
         assert np.nanmean(landed.position[..., 0], axis=1).min() > 0.02
-
-
-def test_cells_are_as_wide_as_asked(poured):
-    cups = poured["thin_contact_60"].cups
-    assert cell_width(cups, 0.004) == pytest.approx(0.004, rel=1e-3)
-    assert 0.003 < cell_width(cups, None) < 0.006

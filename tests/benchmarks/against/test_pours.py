@@ -1,6 +1,5 @@
 """What is read of a reference's pours, and what is refused."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -49,53 +48,3 @@ def test_the_reference_of_volume_of_fluid_is_as_it_is_described():
         assert one.cups.pour.hold == pytest.approx(0.9 + 4.0 * min(one.viscosity, 0.3))
     assert not found["oil_contact_30"].retained_resolved
     assert found["glycerin_contact_110"].cups.contact_angle == pytest.approx(np.radians(110.0))
-
-
-def edited(file, old, new):
-    def edit(pours):
-        path = pours / file
-        assert old in path.read_text()
-        path.write_text(path.read_text().replace(old, new, 1))
-
-    return edit
-
-
-def in_truths(old, new):
-    return edited("pour_truths.csv", old, new)
-
-
-def landed_elsewhere(pours):
-    """All bins 10 mm further out, as if another lip had been the origin."""
-    path = pours / "pours_landings.json"
-    landings = json.loads(path.read_text())
-    for place in landings["cases"]["thin_45"]["x_y_fraction"]:
-        place[0] += 10
-    path.write_text(json.dumps(landings))
-
-
-def twice(pours):
-    table = pours / "pours.csv"
-    row = next(line for line in table.read_text().splitlines() if line.startswith("thick,45.0,2.0"))
-    table.write_text(table.read_text() + row + "\n")
-
-
-FAULTS = {
-    "no table": (lambda pours: (pours / "wetting.csv").unlink(), "wetting.csv: no such file"),
-    "no column": (in_truths("hold_s", "hold"), "hold_s"),
-    "no density": (in_truths("thick,1,1000", "thick,1,0"), r"line 4: .*\n?density_kg_m3"),
-    "mN/m": (in_truths("1000,0.06,", "1000,60,"), "surface_tension_N_m"),
-    "resolved": (in_truths("1.5,no", "1.5,maybe"), "retained_resolved"),
-    "two rows": (in_truths("0.001,1000,0.06,110", "0.001,1000,0.06,60"), "two rows of a liquid"),
-    "no row": (edited("pours.csv", "thick,45", "honey,45"), "no row for {'honey'}"),
-    "same place": (twice, "two rows of thick at 45 deg/s are alike"),
-    "no origin": (landed_elsewhere, "thin at 45 deg/s spill .* more or less than the table"),
-    "no shares": (edited("pours_landings.json", '"x_y_fraction"', '"xyf"'), "x_y_fraction"),
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_faults_are_refused(pours, fault):
-    make, told = FAULTS[fault]
-    make(pours)
-    with pytest.raises(ValueError, match=told):
-        open_poured_liquids(pours)

@@ -8,12 +8,9 @@ from .stir_replay import (
     SEEDS,
     repeat_stir,
     rms,
-    rms_bar,
     simulate_stir,
     spread,
-    stir_panels,
     stir_rows,
-    without_noise,
 )
 
 
@@ -45,12 +42,6 @@ def test_each_bar_is_that_of_the_liquid(stirs, shifted, offset, spread, name, pa
     assert all(row.passed for row in rows) is passes
 
 
-def test_bars_by_viscosity():
-    viscosities = (0.001, 0.0299, 0.03, 0.05, 0.08, 0.1, 0.2, 1.0, 12.0)
-    bars = [rms_bar(viscosity) for viscosity in viscosities]
-    assert bars == [0.6, 0.6, 0.55, 0.55, 0.36, 0.36, 0.1, 0.1, 0.1]
-
-
 def test_a_failed_simulation_fails(stirs, shifted):
     def simulate(stir, seeds):
         signals = shifted()(stir, seeds)
@@ -70,25 +61,6 @@ def test_missed_samples_are_left_out():
     assert np.isnan(rms(np.full((5, 2), np.nan)))
 
 
-def test_what_is_less_than_the_noise_is_nothing():
-    assert without_noise(0.05) == 0.0
-    assert without_noise(np.sqrt(0.02), recordings=2) == pytest.approx(0.0, abs=1e-8)
-    assert np.isnan(without_noise(np.nan))
-    assert spread(np.zeros((4, 5, 2))) == 0.0
-
-
-def test_the_timed_stir_is_the_whole_one_after_a_short_one_with_other_seeds(stirs, shifted):
-    calls = []
-
-    def simulate(stir, seeds):
-        calls.append((len(stir.recording.time), list(seeds)))
-        return shifted()(stir, seeds)
-
-    repeat_stir(stirs["oil_v10"], simulate, seed=1)
-    first = [SEEDS + k for k in range(SEEDS)]
-    assert calls == [(10, [seed + SEEDS for seed in first]), (60, first)]
-
-
 def test_the_true_liquid_is_stirred_in_the_true_depth(stirs, monkeypatch):
     given = {}
 
@@ -103,12 +75,6 @@ def test_the_true_liquid_is_stirred_in_the_true_depth(stirs, monkeypatch):
     assert (given["liquid"].viscosity, given["liquid"].density) == (0.1, density)
     assert given["setup"].cup.fill == 0.05
     assert given["effects"] == {"fill_level": pytest.approx(3e-4)}
-
-
-def test_a_plane_has_a_panel_with_every_seed(stirs, shifted):
-    signals = repeat_stir(stirs["oil_v10"], shifted()).signals
-    panels = stir_panels(stirs["oil_v10"], signals)
-    assert [len(panel.curves) for panel in panels] == [1 + SEEDS] * 2
 
 
 @pytest.mark.slow

@@ -12,7 +12,6 @@ from bolfi_liquids.run.provenance import generations, versions
 from bolfi_liquids.run.run import Run
 
 from .figure import Drawn
-from .figure_of_adhesion import adhesion
 from .figure_of_geometry import geometry
 from .figure_of_recordings import recordings
 from .figure_of_strokes import strokes
@@ -31,7 +30,6 @@ FIGURES: dict[str, Callable[[SharedSimulations], Drawn]] = {
     "decision": decision,
     "surrogates": surrogates,
     "strokes": strokes,
-    "adhesion": adhesion,
 }
 """By name, in the order in which they are made."""
 
@@ -57,8 +55,6 @@ def draw_figures(
     made_with = {"scale": asdict(scale), **generations(), "versions": versions()}
     with alone_in(out), Run(out, {}).bank() as bank:
         shared = SharedSimulations(out, scale, bank, executor)
-        if "adhesion" in chosen:
-            shared.begin_sticky()
         for name in chosen:
             began = time.perf_counter()
             drawn = FIGURES[name](shared)

@@ -1,9 +1,8 @@
 """Simulations and calibrations that figures share; each is made once and kept."""
 
-from collections.abc import Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 
 from bolfi_liquids.inference import SimulationBank
@@ -20,7 +19,6 @@ from bolfi_liquids.run.run import SIMULATIONS
 
 from .decisions import map_of_all_liquids
 from .learners import after_strokes, by_stirring_and_pouring
-from .sticky_study import Stuck, spilled_where_it_sticks
 from .study import spillage_study
 from .study_size import Scale
 
@@ -65,26 +63,6 @@ class SharedSimulations:
         """The same after stirring for some strokes only."""
         learners = after_strokes(self.scale, self.out / SIMULATIONS)
         return spillage_study(learners, self.landing_map, self.scale, self.compute)
-
-    def begin_sticky(self) -> None:
-        """Start the sticky liquids in the pool: they take longest and depend on nothing else."""
-        _ = self._sticking
-
-    @cached_property
-    def sticky(self) -> list[Stuck]:
-        """Adhesive liquids and their spillage."""
-        found = []
-        with progress_bar("liquids that stick", self.scale.sticky, shown=True) as advance:
-            for one in self._sticking:
-                found.append(one)
-                advance(1)
-        return found
-
-    @cached_property
-    def _sticking(self) -> Iterator[Stuck]:
-        """Results as they come; a process takes whole liquids."""
-        one = partial(spilled_where_it_sticks, self.out, self.runs, self.scale)
-        return (self.executor.map if self.executor else map)(one, range(self.scale.sticky))
 
     @property
     def runs(self) -> Path:

@@ -15,8 +15,6 @@ class Scale:
         recorded: Simulations for each recording of the reference solver.
         strokes: Numbers of strokes to calibrate after.
         few: Budget of each calibration after some strokes.
-        sticky: Repetitions of the liquid that sticks to its cup.
-        considered: Effects that criticism of its pours considers.
         rates: Angular velocities among which pours after a recording are chosen.
         surrogates: Surrogates that recordings are calibrated with.
         lips: Heights of the lip that are compared [m].
@@ -32,8 +30,6 @@ class Scale:
     recorded: tuple[int, ...] = (10, 20)
     strokes: tuple[int, ...] = (1, 2, 3, 5, 10)
     few: int = 10
-    sticky: int = 5
-    considered: tuple[str, ...] = ("adhesion", "shear_thinning", "yield_stress")
     rates: int = 15
     surrogates: tuple[str, ...] = ("discrepancy", "signal")
     lips: tuple[float, ...] = (0.10, 0.14, 0.20, 0.26)
@@ -49,8 +45,6 @@ QUICK = Scale(
     budgets=(5, 10, 20),
     recorded=(10,),
     strokes=(1, 3, 10),
-    sticky=1,
-    considered=("adhesion", "yield_stress"),
     rates=9,
     surrogates=("discrepancy",),
     lips=(0.14, 0.20),

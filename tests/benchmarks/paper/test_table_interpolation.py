@@ -5,10 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bolfi_liquids import models
-from bolfi_liquids.inputs.bundled import bundled_pours
-from bolfi_liquids.inputs.cups import bundled_cups
-
 from .table_interpolation import between
 
 RATES = np.geomspace(0.5, 3.0, 5)
@@ -58,35 +54,3 @@ def test_beyond_the_table_its_edge_is_taken_and_no_error_is_claimed():
         assert value == pytest.approx(edge)
         assert np.isnan(error)
     assert np.isfinite(between(rising, RATES[-1], 0.06)[1])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("viscosity", "rate"), [(0.01, 30.0), (0.1, 30.0), (1.0, 90.0)])
-def test_it_is_nearer_than_chords_to_a_finely_simulated_valley(viscosity, rate):
-    """Of liquids like water, oil and glycerin, told at the distances of the bundled pours.
-
-    Compared where less than 5 % is spilled: there choices lie.
-    """
-    pours, cups = bundled_pours("water"), bundled_cups()
-    slowest = pours.angular_velocity == pours.angular_velocity.min()
-    known, rate = np.sort(pours.distance[slowest]), np.radians(rate)
-    fine = np.arange(known[0], known[-1], 5e-4)
-    seeds = np.arange(16)
-    liquid = models.Liquid(viscosity, np.linspace(0.0, 1.0, 16), 1000.0)
-    landed = models.landings(liquid, rate, cups, seeds, particles=900)
-
-    def spilled(distance):
-        return landed.into(distance[:, None], cups.receiver.radius).spilled.mean(axis=1)
-
-    column = spilled(known)
-    told = SimpleNamespace(
-        angular_velocity=np.full(len(known), rate), distance=known, fractions=column[:, None]
-    )
-    truth = spilled(fine)
-    low = truth < 0.05
-    by_cubics = np.array([between(told, rate, distance)[0] for distance in fine])
-    by_chords = np.interp(fine, known, column)
-    missed = [guess[low] - truth[low] for guess in (by_cubics, by_chords)]
-    assert low.sum() > 5
-    assert np.abs(missed[0].mean()) < np.abs(missed[1].mean())
-    assert np.sqrt(np.mean(missed[0] ** 2)) < np.sqrt(np.mean(missed[1] ** 2))

@@ -81,7 +81,7 @@ def found(task: Task, shift: float, seed: int) -> bool:
 
 @pytest.mark.benchmark
 def test_faults_in_a_quarter_of_the_posterior_are_found():
-    """Prints; run with `pytest -m benchmark -s tests/benchmarks/bars/test_local_faults.py`."""
+    """Prints; run with `pytest -m benchmark -s tests/benchmarks/test_local_faults.py`."""
     shares = {}
     for shift, fits in ((SHIFT, FITS), (0.0, NULLS)):
         told = {
