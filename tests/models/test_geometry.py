@@ -65,7 +65,7 @@ def test_edge_is_the_open_share_of_the_box_around_it(geometry):
 
 
 RADIUS = 0.028
-THIN = [0.005, 0.004, 0.0033]  # m, cells of which a wall of 2 mm is 0.4 to 0.6
+THIN = [0.005, 0.0033]  # m, cells of which a wall of 2 mm is 0.4 and 0.6
 
 
 def of_half(vessel, axis):

@@ -139,7 +139,7 @@ def test_a_stick_that_starts_inclined_is_simulated_so(glycerin):
     assert models.StirSetup.from_recording(unseen).tilt == (0.0, 0.0)
 
 
-@pytest.mark.parametrize("rate", [10.0, 30.0, 125.0, 500.0])
+@pytest.mark.parametrize("rate", [10.0, 500.0])
 def test_the_path_is_the_same_at_every_rate_of_samples(rate):
     """A circle, and noise of an arm's encoders, which must not become acceleration."""
     time, step = np.arange(0.0, 3.0, 1.0 / rate), 0.012
@@ -197,14 +197,14 @@ def test_a_path_without_samples_is_refused(glycerin):
         models.stir(models.Liquid(1.0, 0.0, 1000.0), gap, setup, [0])
 
 
-@pytest.mark.parametrize("seeds", [[], [0.5], [-1], [[0]]])
+@pytest.mark.parametrize("seeds", [[], [0.5], [-1]])
 def test_bad_seeds_are_named(glycerin, seeds):
     setup = models.StirSetup.from_recording(glycerin, particles=100)
     with pytest.raises(ValueError, match="seeds must be integers"):
         models.stir(models.Liquid(1.0, 0.0, 1000.0), glycerin.gripper, setup, seeds)
 
 
-@pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 7, 8])
+@pytest.mark.parametrize("size", [1, 3, 8])
 def test_few_stirs_are_shared_among_all_groups(size):
     slots = Places(size, 2, 4).slots
     assert len(set(slots)) == size and slots.max() < 8
