@@ -1,7 +1,7 @@
 """An effect: one coefficient whose neutral value leaves the base model as it was."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
@@ -72,37 +72,34 @@ class Effect:
     highest: float = math.inf
 
     def __post_init__(self) -> None:
+        for fault in self._faults():
+            raise ValueError(f"effect {self.name!r}: {fault}")
+
+    def _faults(self) -> Iterator[str]:
         if not (isinstance(self.name, str) and self.name.isidentifier()):
-            raise ValueError(f"an effect's name must be an identifier, got {self.name!r}")
+            yield "name must be an identifier"
         if self.name in FIELDS:
-            raise ValueError(f"effect name {self.name!r} is taken by a liquid's {self.name}")
+            yield f"name is taken by a liquid's {self.name}"
         for field in ("unit", "text", "source"):
             value = getattr(self, field)
             if not (isinstance(value, str) and value.strip()):
-                raise self._fault(f"{field} must say something, got {value!r}")
+                yield f"{field} must say something, got {value!r}"
         if isinstance(self.neutral, bool) or not isinstance(self.neutral, (int, float)):
-            raise self._fault(f"neutral must be a number, got {self.neutral!r}")
-        if not math.isfinite(self.neutral):
-            raise self._fault(f"neutral must be finite, got {self.neutral}")
+            yield f"neutral must be a number, got {self.neutral!r}"
+        if not self.lowest <= self.neutral <= self.highest or not math.isfinite(self.neutral):
+            limits = f"between {self.lowest} and {self.highest}"
+            yield f"neutral must be finite and lie {limits}, got {self.neutral}"
         if self.acts_in not in SCENES:
-            raise self._fault(f"acts_in must be one of {', '.join(SCENES)}, got {self.acts_in!r}")
+            yield f"acts_in must be one of {', '.join(SCENES)}, got {self.acts_in!r}"
         if not callable(self.make_prior):
-            raise self._fault(
-                "make_prior must be a function that returns a numpyro distribution, "
-                f"got {self.make_prior!r}"
-            )
-        if not self.lowest <= self.neutral <= self.highest:
-            raise self._fault(f"neutral must lie between {self.lowest} and {self.highest}")
+            yield f"make_prior must return a numpyro distribution, got {self.make_prior!r}"
         needed = HOOKS[self.acts_in]
         if all(getattr(self, hook) is None for hook in needed):
-            raise self._fault(f"acts_in={self.acts_in!r} needs the hook {' or '.join(needed)}")
+            yield f"acts_in={self.acts_in!r} needs the hook {' or '.join(needed)}"
         for hook in (hook for hooks in HOOKS.values() for hook in hooks):
             value = getattr(self, hook)
             if value is not None and not callable(value):
-                raise self._fault(f"the hook {hook} must be a function, got {value!r}")
-
-    def _fault(self, what: str) -> ValueError:
-        return ValueError(f"effect {self.name!r}: {what}")
+                yield f"the hook {hook} must be a function, got {value!r}"
 
     @property
     def parameter(self) -> str:

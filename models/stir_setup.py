@@ -1,6 +1,6 @@
 """Setup of a stirring simulation besides liquid, path and seed: cup, stick, discretisation."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol
 
@@ -85,24 +85,26 @@ class StirSetup:
     def __post_init__(self) -> None:
         check_numbers("setup", submerged=self.submerged)
         check_numbers("setup", zero=True, particles=self.particles)
-        if self.particles != int(self.particles):
-            raise ValueError(f"setup: particles must be a whole number, got {self.particles}")
-        if len(self.tilt) != 2 or not all(abs(angle) < MAX_TILT for angle in self.tilt):
-            raise ValueError(
-                f"setup: tilt must be two angles of less than {MAX_TILT} rad, got {self.tilt}"
-            )
-        if self.submerged > self.stick.length:
-            raise ValueError(
-                "setup: submerged must be at most the stick's length, or its pivot is in the "
-                f"liquid: {self.stick.length:g} m, got {self.submerged:g}; raise the gripper"
-            )
-        if self.stick.radius >= self.cup.radius:
-            raise ValueError(
-                f"setup: the stick, of radius {self.stick.radius} m, does not fit into the cup, of "
-                f"radius {self.cup.radius} m"
-            )
+        for fault in self._faults():
+            raise ValueError(f"setup: {fault}")
         if self.particles == 0:
             object.__setattr__(self, "particles", self._usual_particles())
+
+    def _faults(self) -> Iterator[str]:
+        if self.particles != int(self.particles):
+            yield f"particles must be a whole number, got {self.particles}"
+        if len(self.tilt) != 2 or not all(abs(angle) < MAX_TILT for angle in self.tilt):
+            yield f"tilt must be two angles of less than {MAX_TILT} rad, got {self.tilt}"
+        if self.submerged > self.stick.length:
+            yield (
+                "submerged must be at most the stick's length, or its pivot is in the liquid: "
+                f"{self.stick.length:g} m, got {self.submerged:g}; raise the gripper"
+            )
+        if self.stick.radius >= self.cup.radius:
+            yield (
+                f"the stick, of radius {self.stick.radius} m, does not fit into the cup, of "
+                f"radius {self.cup.radius} m"
+            )
 
     @classmethod
     def from_recording(

@@ -172,7 +172,7 @@ def test_bad_coefficients_are_named(stir, effects, message):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"name": "side wind"}, "identifier, got 'side wind'"),
+        ({"name": "side wind"}, "'side wind': name must be an identifier"),
         ({"name": "cohesion"}, "taken by a liquid's cohesion"),
         ({"unit": ""}, "unit must say something"),
         ({"text": " "}, "text must say something"),
@@ -183,9 +183,9 @@ def test_bad_coefficients_are_named(stir, effects, message):
         ({"acts_in": "rig"}, "needs the hook rig"),
         ({"signal": None}, "needs the hook signal"),
         ({"acts_in": "liquid"}, "needs the hook make_rheology or wetting"),
-        ({"lowest": 1.0}, "neutral must lie between 1.0 and inf"),
+        ({"lowest": 1.0}, "neutral must be finite and lie between 1.0 and inf"),
         ({"signal": 1.0}, "hook signal must be a function"),
-        ({"make_prior": 1.0}, "make_prior must be a function"),
+        ({"make_prior": 1.0}, "make_prior must return"),
     ],
 )
 def test_nonsense_is_no_effect(changes, message):
