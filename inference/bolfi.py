@@ -34,10 +34,9 @@ from .simulations.failures import Failure, FailureKind, unusable
 from .simulations.job import BATCH
 from .simulations.returned import told_signals
 from .sobol import sobol, start_size
-from .surrogates.base import Acquisition, Family, Measured, TrainingData
+from .surrogates.base import Acquisition, Family, Measured, RunOutcomes, TrainingData
 from .surrogates.discrepancy import is_outlier
 from .surrogates.families import resolve
-from .surrogates.success import RunOutcomes
 from .surrogates.warnings import complain
 from .types import Theta
 

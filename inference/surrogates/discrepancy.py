@@ -21,9 +21,8 @@ from ..gp.process import (
 from ..types import Discrepancy
 from . import warnings
 from .base import Family, Measured, TrainingData, flattened
-from .processes import OfProcesses
+from .processes import OfProcesses, learn_success
 from .squared_difference import MIN_FREEDOM, evaluate, independent, numbers, squared_difference
-from .success import learn_success
 from .threshold import (
     Matched,
     Threshold,
@@ -65,7 +64,7 @@ class DiscrepancySurrogate(OfProcesses):
         threshold: eps on the scale of g(Delta).
         learned_at: Simulations known when the hyperparameters were found.
         chosen_at: Simulations known when the transform was chosen.
-        success: Where runs succeed, see `success.learn_success`.
+        success: Where runs succeed, see `processes.learn_success`.
         width: Sd that the threshold has itself, on the scale of g(Delta).
         noisy: Whether the noise of g(Delta) alone makes the posterior wider than the data do, as
             far as the threshold is `Matched`.

@@ -23,8 +23,7 @@ from ..sampling.importance import explore
 from ..sampling.target import Target
 from ..simulations.failures import Failure, impossible, incomparable, not_finite
 from .base import Family, Measured, TrainingData
-from .processes import OfProcesses
-from .success import learn_success, log_success
+from .processes import OfProcesses, learn_success, log_success
 from .warnings import EQUAL, UNCERTAIN, complaints
 
 NEAR = 40.0  # nats below the best, down to which a log likelihood must be right
@@ -82,7 +81,7 @@ class LevelLikelihood(NamedTuple):
 
     gp: GP
     scale: LogLikelihoodScale
-    success: GP | None = None  # see `success.learn_success`
+    success: GP | None = None  # see `processes.learn_success`
     doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts against a place
     optimism: np.ndarray = np.zeros(())
     rise: np.ndarray = np.full((), MAX_RISE)  # nats above the best value that count at most

@@ -9,10 +9,9 @@ import numpy as np
 
 from ..gp.namespaces import log_sum_exp, namespace
 from ..gp.process import GP, padded, predict
-from .emulator import Emulator
+from .emulator import Emulator, Size
 from .measurement_noise import Reduced
-from .noise.run_size import Size, log_size
-from .success import log_success
+from .processes import log_success
 
 SCORES_TOGETHER = 8  # by which the scores of padded states are counted
 WALL = 0.01  # of prior quantiles, beyond a box, over which the likelihood vanishes
@@ -31,7 +30,7 @@ class SignalLikelihood(NamedTuple):
     log_weight: np.ndarray  # [g]
     low: np.ndarray  # [d], ends of the box outside of which the likelihood vanishes
     high: np.ndarray
-    success: GP | None = None  # see `success.learn_success`
+    success: GP | None = None  # see `processes.learn_success`
     doubt: np.ndarray = np.ones(())  # the part of the emulator's variance that counts
     size: Size | None = None  # of the run-to-run noise, where it depends on the parameters
     # of size 1: its share of each node's noise [g], `Reduced.unexplained` [g], and values less
@@ -100,10 +99,10 @@ def likelihood_of(
     """That of the components in use."""
     used, d = emulator.basis.used, emulator.gp.data.u.shape[1]
     state = SignalLikelihood(
-        emulator.gp.only(slice(used)),
+        emulator.scores,
         np.ones(used),
-        reduced.estimate[:, :used],
-        reduced.covariance[:, :used, :used],
+        reduced.estimate,
+        reduced.covariance,
         reduced.log_weight,
         *(box or (np.zeros(d), np.ones(d))),
     )
@@ -136,7 +135,7 @@ def _noise_factor(state: SignalLikelihood, size: Size, u: Any) -> Any:
     Exact where a node has no other noise, or next to no run-to-run noise; between the two, all of
     a node's noise keeps its shape while it grows.
     """
-    spread = namespace(u).exp(2.0 * log_size(size, u))
+    spread = namespace(u).exp(2.0 * size.log(u))
     return 1.0 + state.share * (spread[:, None] - 1.0)
 
 

@@ -9,7 +9,7 @@ from scipy.special import ndtr, ndtri, owens_t
 
 from ..gp.namespaces import log_ndtr, log_sum_exp, namespace
 from ..gp.process import GP, predict
-from .success import log_success
+from .processes import log_success
 from .transform import Transform
 
 
@@ -20,7 +20,7 @@ class ThresholdLikelihood(NamedTuple):
     threshold: np.ndarray  # []
     width: np.ndarray  # [], sd that the threshold has itself
     resolution: np.ndarray  # [], sd of the latent mean from which doubt counts against a place
-    success: GP | None = None  # see `success.learn_success`
+    success: GP | None = None  # see `processes.learn_success`
     doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts
 
     def __call__(self, u: Any) -> Any:

@@ -14,8 +14,9 @@ from bolfi_liquids.inference.acquisition.rules import (
 )
 from bolfi_liquids.inference.gp.process import predict
 from bolfi_liquids.inference.sobol import sobol
+from bolfi_liquids.inference.surrogates.base import RunOutcomes
 from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
-from bolfi_liquids.inference.surrogates.success import RunOutcomes, learn_success, log_success
+from bolfi_liquids.inference.surrogates.processes import learn_success, log_success
 from scipy.stats import kstest, multivariate_normal, norm, qmc, truncnorm
 
 from bolfi_liquids import inference

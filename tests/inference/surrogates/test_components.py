@@ -4,7 +4,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from bolfi_liquids.inference.surrogates.components import principal_components
+from bolfi_liquids.inference.surrogates.emulator import principal_components
 
 
 @pytest.mark.parametrize(("n", "m"), [(9, 40), (40, 40), (200, 7)])

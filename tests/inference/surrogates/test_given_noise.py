@@ -5,7 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 from bolfi_liquids.inference.surrogates import SignalFamily
-from bolfi_liquids.inference.surrogates.given_noise import given_noise
+from bolfi_liquids.inference.surrogates.noise.given import given_noise
 from bolfi_liquids.inference.surrogates.output_vectors import MAX_VALUES, describe
 
 from bolfi_liquids import inference

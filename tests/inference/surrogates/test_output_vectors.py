@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from bolfi_liquids.inference.surrogates.components import principal_components
+from bolfi_liquids.inference.surrogates.emulator import principal_components
 from bolfi_liquids.inference.surrogates.output_vectors import MAX_VALUES, describe
 
 

@@ -11,8 +11,8 @@ from bolfi_liquids.inference.gp.hyperparameters import NOISE
 from bolfi_liquids.inference.gp.process import predict
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates import SignalFamily, TrainingData
-from bolfi_liquids.inference.surrogates.emulator import EmulatorLimits, emulate, noise_share
-from bolfi_liquids.inference.surrogates.success import RunOutcomes
+from bolfi_liquids.inference.surrogates.base import RunOutcomes
+from bolfi_liquids.inference.surrogates.emulator import EmulatorLimits, emulate
 from bolfi_liquids.inference.surrogates.warnings import UNREPEATED
 from scipy.stats import binom, multivariate_normal
 
@@ -180,7 +180,7 @@ def test_a_missing_stretch_and_missing_runs_do_no_harm(design, noise):
 def test_the_check_speaks_up_where_noise_rules(design):
     loud = outputs(design, range(30)) + 10.0 * np.random.default_rng(0).normal(size=(30, 1))
     found = learned(design, loud, loud[0])
-    assert noise_share(found.emulator) > 0.5
+    assert found.emulator.noise_share > 0.5
     assert UNREPEATED in found.warnings()
     rng = np.random.default_rng(1)
     again = loud[:3] + 10.0 * rng.normal(size=(3, 1)), loud[:3]

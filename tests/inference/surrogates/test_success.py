@@ -3,7 +3,8 @@
 import numpy as np
 import numpyro.distributions as dist
 from bolfi_liquids.inference.sobol import sobol
-from bolfi_liquids.inference.surrogates.success import RunOutcomes, learn_success, log_success
+from bolfi_liquids.inference.surrogates.base import RunOutcomes
+from bolfi_liquids.inference.surrogates.processes import learn_success, log_success
 
 from bolfi_liquids import inference
 

@@ -1,14 +1,14 @@
-"""Measurement noise that the user knows, over the values of an output."""
+"""Measurement noise that users give: its sd, its sds or its covariance."""
 
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._float64 import in_float64
-from ..arguments import checked_array
-from .measurement_noise import Layout
-from .output_vectors import Output
+from ..._float64 import in_float64
+from ...arguments import checked_array
+from ..measurement_noise import Layout
+from ..output_vectors import Output
 
 
 @runtime_checkable
