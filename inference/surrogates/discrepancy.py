@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from ..arguments import check_callable
+from ..arguments import check_callable, check_choice
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.process import (
     GP,
@@ -24,14 +24,16 @@ from .base import Family, Measured, TrainingData, flattened
 from .processes import OfProcesses, learn_success
 from .squared_difference import MIN_FREEDOM, evaluate, independent, numbers, squared_difference
 from .threshold import (
+    TRANSFORMS,
     Matched,
     Threshold,
     ThresholdLikelihood,
+    Transform,
+    candidates,
     check_rule,
     choose_threshold,
     matched,
 )
-from .transform import Transform, candidates, check_transform
 
 BETWEEN = 0.25  # of the least simulated discrepancy: the least that is taken for its minimum
 MIN_RESOLUTION = 1e-4  # of the spread of g(Delta)
@@ -234,24 +236,20 @@ def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> Discrepanc
     Raises:
         ValueError: the transform is undefined at the given threshold.
     """
-
-    def at_minimum() -> tuple[float, float]:
-        mean, sd = learned.predict(learned.u)
-        best = np.argmin(mean)
-        return float(mean[best]), float(sd[best])
-
-    if rule is None or isinstance(rule, Matched):
-        d = learned.u.shape[1]
-        matching = Matched(d + UNKNOWN_FREEDOM) if rule is None else rule
-        least = at_minimum()
-        mean, sd = (float(part[0]) for part in learned.predict(learned.best()[None]))
-        # between the runs the least may be lower, but not out of all proportion
-        if learned.transform.inverse(np.asarray(mean)) > BETWEEN * learned.discrepancy.min():
-            least = min(least, (mean, sd))
-        threshold, width = matched(matching, *least, learned.transform, d)
-        return replace(learned, threshold=threshold, width=width, noisy=width == 0.0)
-    threshold = choose_threshold(rule, learned.discrepancy, learned.transform, at_minimum)
-    return replace(learned, threshold=threshold, width=0.0, noisy=False)
+    mean, sd = learned.predict(learned.u)
+    i = np.argmin(mean)
+    least = float(mean[i]), float(sd[i])
+    if rule is not None and not isinstance(rule, Matched):
+        threshold = choose_threshold(rule, learned.discrepancy, learned.transform, least)
+        return replace(learned, threshold=threshold, width=0.0, noisy=False)
+    d = learned.u.shape[1]
+    matching = Matched(d + UNKNOWN_FREEDOM) if rule is None else rule
+    between = tuple(float(part[0]) for part in learned.predict(learned.best()[None]))
+    # between the runs the least may be lower, but not out of all proportion
+    if learned.transform.inverse(np.asarray(between[0])) > BETWEEN * learned.discrepancy.min():
+        least = min(least, between)
+    threshold, width = matched(matching, *least, learned.transform, d)
+    return replace(learned, threshold=threshold, width=width, noisy=width == 0.0)
 
 
 def _standardise(transform: Transform, values: np.ndarray) -> DiscrepancyScale:
@@ -303,7 +301,7 @@ class DiscrepancyFamily(Family):
     def __post_init__(self) -> None:
         check_rule(self.threshold)
         check_callable("discrepancy", self.discrepancy)
-        check_transform(self.transform)
+        check_choice("transform", self.transform, (*TRANSFORMS, None))
 
     @property
     def any_shape(self) -> bool:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
-from bolfi_liquids.inference.surrogates.transform import Transform, candidates
+from bolfi_liquids.inference.surrogates.threshold import Transform, candidates
 
 pytestmark = pytest.mark.slow
 

@@ -10,10 +10,10 @@ from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
 from bolfi_liquids.inference.surrogates.threshold import (
     Matched,
     Predicted,
+    Transform,
     log_both_below,
     matched,
 )
-from bolfi_liquids.inference.surrogates.transform import Transform
 from scipy.special import erfcx
 from scipy.stats import norm
 
