@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from ..arguments import checked_array
 from ..simulations.failures import Failure, incomparable, raised
 from ..types import Discrepancy
-from .output_vectors import MIN_SERIES
+from .output_vectors import MIN_SERIES, check_shape
 
 MIN_FREEDOM = 3  # numbers more than parameters, from which the size of the noise can be told
 
@@ -41,8 +41,7 @@ def squared_difference(time: ArrayLike | None = None) -> Discrepancy:
 def _integrated(grid: np.ndarray | None, observed: np.ndarray, simulated: np.ndarray) -> float:
     observed = np.asarray(observed, np.float64)
     simulated = np.asarray(simulated, np.float64)
-    if observed.shape != simulated.shape:
-        raise ValueError(f"expected a signal of {observed.shape}, got {simulated.shape}")
+    check_shape("a signal", observed.shape, simulated.shape)
     weights = trapezoid_weights(np.isfinite(observed), grid)
     used = weights > 0
     with np.errstate(all="ignore"):  # of a run that blew up
@@ -55,10 +54,7 @@ def sum_of_squares(observed: np.ndarray, simulated: np.ndarray) -> float:
     Raises:
         ValueError: shapes differ.
     """
-    if observed.shape != simulated.shape:
-        raise ValueError(
-            f"expected an output of shape {observed.shape}, as observed, got {simulated.shape}"
-        )
+    check_shape("an output", observed.shape, simulated.shape)
     there = np.isfinite(observed)
     with np.errstate(all="ignore"):  # of a run that blew up
         return float(np.sum((observed[there] - simulated[there]) ** 2))

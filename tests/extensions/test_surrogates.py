@@ -258,6 +258,29 @@ def test_what_is_no_family_is_refused_before_it_learns():
             inference.Bolfi(PRIOR, OBSERVED, surrogate=given)
 
 
+def test_what_is_no_surrogate_is_refused_with_what_is_missing():
+    """At the border of search and fit, whether its class is derived from `Surrogate` or not."""
+    found = fitted(example()).learned
+
+    class Unfinished(Surrogate):
+        u, best, predict = found.u, found.best, found.predict
+
+    for returned, missing in {
+        None: "NoneType without best, .*warnings",
+        Unfinished(): "Unfinished without fantasize, log_likelihood;",
+    }.items():
+
+        class Odd(type(example())):
+            def learn(self, data, key):
+                return returned  # noqa: B023
+
+        engine = inference.Bolfi(PRIOR, OBSERVED, surrogate=Odd())
+        engine.tell(PRIOR.from_unit(POINTS), simulate(PRIOR.from_unit(POINTS), range(3)))
+        for act in (engine.fit, lambda: engine.ask(9)):  # noqa: B023
+            with pytest.raises(ValueError, match=missing):
+                act()
+
+
 def test_a_family_cannot_change_the_signals_that_it_measures():
     class Writing(type(example())):
         def measure(self, observed, signals):

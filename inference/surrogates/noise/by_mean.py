@@ -8,7 +8,7 @@ from typing import ClassVar, cast
 import numpy as np
 from scipy.special import xlogy
 
-from ...arguments import checked_array, checked_number
+from ...arguments import check_choice, checked_array, checked_number
 from ..output_vectors import Output
 from .given import GivenNoise
 
@@ -115,8 +115,7 @@ def law_of(noise: object) -> Law | None:
         ValueError: text other than "poisson".
     """
     if isinstance(noise, str):
-        if noise != "poisson":
-            raise ValueError(f'noise must be "poisson", a function or numbers, got {noise!r:.100}')
+        check_choice("noise, where it is text,", noise, ("poisson",))
         return Poisson()
     return Gaussian(cast(SdOfMean, noise)) if callable(noise) else None
 

@@ -104,7 +104,7 @@ def test_means_go_to_the_scale_and_back():
 @pytest.mark.parametrize(
     ("noise", "observed", "message"),
     [
-        ("gauss", COUNTS, 'noise must be "poisson", a function or numbers'),
+        ("gauss", COUNTS, "noise, where it is text"),
         ("poisson", -COUNTS - 1.0, "not negative, got -"),
         (lambda mean: 0.0 * mean, COUNTS, "positive, finite sd for each mean, got 0"),
         (lambda mean: -mean, COUNTS + 1.0, "positive, finite sd for each mean, got -"),

@@ -35,7 +35,12 @@ def test_a_simulated_nan_counts_only_where_something_was_observed():
     [
         ([0.0, 0.0, 1.0], np.zeros(3), np.zeros(3), "strictly increasing"),
         ([0.0, 1.0], np.zeros(3), np.zeros(3), "observed has 3 samples"),
-        (None, np.zeros(3), np.zeros(4), r"expected a signal of \(3,\), got \(4,\)"),
+        (
+            None,
+            np.zeros(3),
+            np.zeros(4),
+            r"expected a signal of shape \(3,\), as observed, got \(4,\)",
+        ),
         (None, np.array([1.0, np.nan]), np.zeros(2), "two finite samples"),
         (None, np.array(1.0), np.array(1.0), "two finite samples"),
     ],
