@@ -3,15 +3,27 @@
 The probability that a run succeeds is a factor of the likelihood.
 """
 
+from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from ..gp.hyperparameters import LENGTH
 from ..gp.namespaces import log_ndtr, namespace
 from ..gp.optimise import surely_least
-from ..gp.process import GP, Data, Hyper, condition, coordinates, covariance, predict, resolved
+from ..gp.process import (
+    GP,
+    Data,
+    Hyper,
+    condition,
+    coordinates,
+    covariance,
+    fantasize,
+    leave_one_out_errors,
+    predict,
+    resolved,
+)
 from ..types import LogLikelihood
 from .base import RunOutcomes, Surrogate
 
@@ -52,6 +64,36 @@ class OfProcesses(Surrogate):
 
     def log_success(self, u: np.ndarray) -> np.ndarray:
         return log_success(self.log_likelihood.success, u)
+
+
+@dataclass(frozen=True, eq=False)
+class OfOneProcess(OfProcesses):
+    """A surrogate of one process, of a number of each run.
+
+    Attributes:
+        gp: The conditioned process.
+        values: The numbers that were learned from [n].
+        learned_at: Simulations known when the hyperparameters were found.
+        success: Where runs succeed, see `learn_success`.
+    """
+
+    gp: GP
+    values: np.ndarray
+    learned_at: int
+    success: GP | None = field(default=None, kw_only=True)
+
+    def fantasize(self, u: np.ndarray) -> Self:
+        """Condition on the predicted means at u [n, d], for points still being simulated."""
+        return replace(self, gp=fantasize(self.gp, u)) if len(u) else self
+
+    def checks(self) -> dict[str, np.ndarray]:
+        """Studentised leave-one-out errors `loo_z` [n, 1]."""
+        return {"loo_z": leave_one_out_errors(self.gp, len(self.values))}
+
+    def new_target(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd of a new target of the process, its noise included, at u [n, d]: [n], [n]."""
+        (mean,), (variance,) = predict(self.gp, u)
+        return mean, np.sqrt(variance + np.exp(2.0 * self.gp.hyper.log_noise[0]))
 
 
 class _Laplace(NamedTuple):
