@@ -1,7 +1,5 @@
 """Samplers against analytic posteriors and quadrature; what happens when they fall short."""
 
-import warnings
-
 import jax
 import numpy as np
 import pytest
@@ -61,6 +59,9 @@ def banana():
 
 def uncorrelated():
     return one(np.full(2, 0.45), np.eye(2) / 0.03)
+
+
+TARGETS = {"uncorrelated": uncorrelated, "bimodal": lambda: bimodal(2)}
 
 
 def sample(sampler, target, length=LENGTH, seed=1, extend=8):
@@ -219,33 +220,24 @@ def test_goes_on_until_it_suffices(monkeypatch):
     assert made.chains.u.shape == (4, 3600, 2)
 
 
-def test_says_so_when_the_budget_does_not_suffice(monkeypatch):
-    monkeypatch.setitem(sampling.SAMPLERS, "slow", slow)
-    made = sample("slow", uncorrelated(), Length(4, 1, 1000), extend=2)
-    assert [*made.found] == [ConvergenceStatus.TOO_FEW_DRAWS]
-    assert "bulk effective sample size" in made.status and "2000" in made.status
-    assert made.steps == 2000
-
-
-def test_stuck_chains_are_not_silent(monkeypatch):
-    monkeypatch.setitem(sampling.SAMPLERS, "stuck", stuck)
-    made = sample("stuck", bimodal(2), extend=4)
-    assert ConvergenceStatus.TOO_FEW_DRAWS in made.found and "R-hat" in made.status
-    assert made.steps == 4000
-
-
-def test_disagreement_with_quadrature_is_not_silent(monkeypatch):
-    """Shifted by 0.7 sd, while R-hat and ESS are perfect."""
-    monkeypatch.setitem(sampling.SAMPLERS, "biased", biased)
-    made = sample("biased", uncorrelated())
-    assert [*made.found] == [ConvergenceStatus.QUADRATURE_DIFFERS]
-    assert made.checks["quadrature_total_variation"] > 0.2
-
-
-def test_divergences_are_not_silent(monkeypatch):
-    monkeypatch.setitem(sampling.SAMPLERS, "divergent", divergent)
-    made = sample("divergent", uncorrelated())
-    assert [*made.found] == [ConvergenceStatus.DIVERGENT] and "5." in made.status
+@pytest.mark.parametrize(
+    ("sampler", "target", "extend", "found", "said"),
+    [
+        (slow, "uncorrelated", 2, ConvergenceStatus.TOO_FEW_DRAWS, "2000"),
+        (stuck, "bimodal", 2, ConvergenceStatus.TOO_FEW_DRAWS, "R-hat"),
+        # shifted by 0.7 sd, while R-hat and ESS are perfect
+        (biased, "uncorrelated", 8, ConvergenceStatus.QUADRATURE_DIFFERS, "total variation 0."),
+        (divergent, "uncorrelated", 8, ConvergenceStatus.DIVERGENT, "5."),
+    ],
+    ids=lambda one: getattr(one, "__name__", None),
+)
+def test_draws_that_fall_short_are_not_silent(monkeypatch, sampler, target, extend, found, said):
+    monkeypatch.setitem(sampling.SAMPLERS, "planted", sampler)
+    made = sample("planted", TARGETS[target](), extend=extend)
+    assert found in made.found and said in made.status
+    if sampler is not stuck:  # these differ from quadrature, too
+        assert [*made.found] == [found]
+    assert made.steps == (2000 if found is ConvergenceStatus.TOO_FEW_DRAWS else 1000)
 
 
 @pytest.mark.slow
@@ -270,7 +262,7 @@ def right_half(state, u):
     return namespace(u).where(u[:, 0] < 0.45, np.nan, peaks(state, u))
 
 
-@pytest.mark.parametrize(("chains", "draws"), [(2, 8), (2, 50), (4, 400), (4, 1000)])
+@pytest.mark.parametrize(("chains", "draws"), [(2, 8), (4, 400)])
 def test_independent_draws_pass_the_limits(chains, draws):
     """At most one false alarm per 400 would fail with probability 0.01; chains half a standard
     deviation apart are caught from 400 draws on."""
@@ -340,14 +332,9 @@ def test_the_global_precision_stays(line_fit):
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"sampler": "gibbs"}, "sampler must be one of"),
-        ({"chains": 1}, "chains must be an integer from 2"),
-        ({"draws": 1}, "draws must be an integer from 4"),
-        ({"extend": 0}, "extend must be an integer from 1"),
-    ],
+    ("option", "value"),
+    [("sampler", "gibbs"), ("chains", 1), ("draws", 3), ("extend", 0), ("warn", "yes")],
 )
-def test_bad_options_are_refused(line_fit, options, message):
-    with pytest.raises(ValueError, match=message), warnings.catch_warnings():
-        line_fit.sample(**options)
+def test_bad_options_are_refused(line_fit, option, value):
+    with pytest.raises(ValueError, match=f"{option} must be"):
+        line_fit.sample(**{option: value})

@@ -103,15 +103,6 @@ def test_the_threshold_is_not_taken_where_nothing_was_simulated():
     assert fitted.predict(np.ones((1, 2)))[0] < 0.0 < fitted.threshold
 
 
-def test_fantasizing_keeps_the_mean_and_shrinks_the_variance():
-    u = sobol(0, 0, 10, 2)
-    fitted = learn(u, bowl(u, np.random.default_rng(0), 1.0))
-    new = np.array([[0.9, 0.1]])
-    fantasized = fitted.fantasize(new)
-    np.testing.assert_allclose(fantasized.predict(new)[0], fitted.predict(new)[0], rtol=1e-9)
-    assert fantasized.predict(new)[1] < fitted.predict(new)[1]
-
-
 def test_hyperparameters_wait_until_the_data_have_grown_by_a_third():
     u = sobol(0, 0, 26, 2)
     values = bowl(u, np.random.default_rng(0), 1.0)
