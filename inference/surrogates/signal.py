@@ -113,7 +113,7 @@ class SignalSurrogate(OfProcesses):
         fantasized = fantasize(self.gp, u, run_spread(self.emulator.size, u))
         return replace(self, emulator=self.emulator._replace(gp=fantasized))
 
-    @property
+    @cached_property
     def node_weights(self) -> np.ndarray:
         """Posterior weights of the nodes, given the best parameters."""
         log_weights = node_log_densities(self.log_likelihood, self.best()[None])[0]
