@@ -218,10 +218,10 @@ def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> Discrepanc
         return replace(learned, threshold=threshold, width=0.0, noisy=False)
     d = learned.u.shape[1]
     matching = Matched(d + UNKNOWN_FREEDOM) if rule is None else rule
-    between = tuple(float(part[0]) for part in learned.predict(learned.best()[None]))
+    between, its_sd = (float(part[0]) for part in learned.predict(learned.best()[None]))
     # between the runs the least may be lower, but not out of all proportion
-    if learned.transform.inverse(np.asarray(between[0])) > BETWEEN * learned.values.min():
-        least = min(least, between)
+    if learned.transform.inverse(np.asarray(between)) > BETWEEN * learned.values.min():
+        least = min(least, (between, its_sd))
     threshold, width = matched(matching, *least, learned.transform, d)
     return replace(learned, threshold=threshold, width=width, noisy=width == 0.0)
 

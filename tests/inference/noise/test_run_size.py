@@ -3,7 +3,7 @@
 import numpy as np
 import numpyro.distributions as dist
 import pytest
-from bolfi_liquids.inference.surrogates.warnings import TOO_FAST, UNREPEATED, WIDE_RANGE
+from bolfi_liquids.inference.surrogates.warnings import WIDE_RANGE
 
 from bolfi_liquids import inference
 
@@ -89,24 +89,6 @@ def peak(theta, seeds):
 def test_a_simulator_that_makes_no_noise_is_not_called_noisy():
     fit, _ = drawn(peak, peak({"q": np.array([5.0])}, None)[0])
     assert not any("run-to-run noise makes up" in one for one in fit.warnings)
-
-
-def test_without_repeated_runs_nobody_knows():
-    theta = np.random.default_rng(0).uniform(0.1, 10, 30)
-    signals = np.sin(40.0 * theta)[:, None] + np.zeros(6)
-    for again, said in ((0, UNREPEATED), (1, TOO_FAST)):
-        known = np.append(theta, theta[: 2 * again]), np.append(signals, signals[: 2 * again], 0)
-        fit = inference.fit(
-            None,
-            PRIOR,
-            np.full(6, 0.3),
-            budget=0,
-            earlier=({"q": known[0]}, known[1]),
-            surrogate=inference.SignalFamily(noise=0.1, predicted=None),
-            progress=False,
-            warn=False,
-        )
-        assert said in fit.warnings
 
 
 def test_data_over_decades_need_a_noise():

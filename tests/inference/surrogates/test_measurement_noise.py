@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference.surrogates.measurement_noise import (
     CORRELATIONS,
+    STEP,
     Layout,
     Nodes,
     candidates,
     correlated,
+    misfit_beside,
     reduce,
     residual_size,
     shrunk_covariance,
@@ -74,6 +76,14 @@ def test_evidence_finds_size_and_correlation_of_the_noise():
     weight /= weight.sum()
     assert abs(np.log(weight @ nodes.sigma / 0.3)) < 0.25
     assert abs(weight @ nodes.rho - 0.6) < 0.2
+
+
+def test_a_misfit_is_as_probable_as_said_and_most_of_all_as_large_as_the_given_noise():
+    nodes, log_weight = misfit_beside(0.3, 0.1, 2.0, False)
+    weight = np.exp(log_weight)
+    assert nodes.sigma[0] == 0.0 and weight[0] == pytest.approx(0.9)
+    assert weight.sum() == pytest.approx(1.0)
+    assert abs(np.log(nodes.sigma[1:][np.argmax(weight[1:])] / 0.3)) < np.log(STEP)
 
 
 def test_white_residuals_stay_white_and_smooth_ones_keep_their_shape():

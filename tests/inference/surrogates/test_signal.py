@@ -122,6 +122,16 @@ def test_the_simulators_own_noise_is_learned_and_not_counted_twice(design, noise
     assert (np.abs(np.log(sd / expected)) < 0.25).all()
 
 
+def test_run_to_run_noise_along_a_component_is_noise():
+    """Observed is one output of a simulator whose first parameter is blurred from run to run."""
+    u = np.concatenate([sobol(0, 0, 40, 2), sobol(0, 0, 6, 2)])
+    blurred = u + np.stack([0.15 * np.random.default_rng(0).normal(size=len(u)), 0 * u[:, 0]], 1)
+    found = learned(u, blurred @ DESIGN[:, :2].T, [0.5, 0.6] @ DESIGN[:, :2].T, noise=SD / 100)
+    mine = posterior(found)
+    sd = np.sqrt(mine @ (GRID - mine @ GRID) ** 2)
+    assert 0.08 < sd[0] < 0.22 and sd[1] < 0.08
+
+
 def test_second_moment_agrees_with_sampling():
     u = sobol(0, 0, 6, 2)
     found = learned(u, outputs(u), outputs(np.array([[0.5, 0.5]]))[0], noise=0.5, misfit=0)

@@ -23,14 +23,6 @@ U = sobol(0, 0, 12, 2)
 DELTA = 1.0 + ((U - 0.4) ** 2).sum(-1)
 
 
-def test_agrees_with_scipy_with_the_noise_in_sigma():
-    fitted = with_threshold(learn(U, DELTA, "identity"), Predicted(0.2))
-    u = np.array([[0.8, 0.3]])
-    mean, sd = fitted.predict(u)
-    value = fitted.log_likelihood(u)
-    np.testing.assert_allclose(value, norm.logcdf((fitted.threshold - mean[0]) / sd[0]), rtol=1e-6)
-
-
 def test_finite_and_monotone_with_finite_gradients_over_a_hundred_decades():
     fitted = with_threshold(learn(U, DELTA, "identity"), Predicted(0.2))
     with jax.enable_x64(True):
