@@ -254,7 +254,7 @@ class Emulator(NamedTuple):
     def noise_share(self) -> float:
         """Share of the outputs' variance that no parameter predicts: run-to-run noise."""
         used, rest = self.basis.used, self.remainder.total
-        weight = np.sum(self.basis.vectors[:, :used] ** 2, 0)  # their scores have unit variance
+        weight = self.basis.squared[:used]  # their scores have unit variance
         spread = float(np.mean(self.gp.data.noise(0.0)))
         noise, rest = spread * np.exp(2.0 * self.gp.hyper.log_noise[:used]), spread * rest
         total = weight.sum() + rest
@@ -480,7 +480,7 @@ def _log_sizes(emulator: Emulator) -> np.ndarray:
     """Log of the size of each run's noise, as its leave-one-out error shows it [n]."""
     basis, gp = emulator.basis, emulator.scores
     mean, variance = leave_one_out(gp)
-    squared = np.sum(basis.vectors[:, : basis.used] ** 2, 0)
+    squared = basis.squared[: basis.used]
     spread = emulator.gp.data.noise(0.0)
     due = squared @ variance + emulator.remainder.total * spread
     residuals = basis.residuals(emulator.outputs)

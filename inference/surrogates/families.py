@@ -30,8 +30,7 @@ def resolve(surrogate: str | Family | None, options: dict[str, Any]) -> Family:
             name a discrepancy and an option of "signal".
     """
     if Family in type(surrogate).__mro__:
-        if options:
-            raise ValueError(f"give {tuple(options)} to {surrogate!r} itself")
+        _check_options(f"{surrogate!r:.100}, which takes its own,", options, set())
         family = cast(Family, surrogate)
         check_called("learn of surrogate", family.learn, "data", "key")
         return family
@@ -52,13 +51,17 @@ def resolve(surrogate: str | Family | None, options: dict[str, Any]) -> Family:
             f"surrogate must be one of {tuple(FAMILIES)}, an object of a class whose base is "
             f"`Family`, or None, got {surrogate!r:.100}"
         )
-    unknown = options.keys() - _options(surrogate)
+    _check_options(repr(surrogate), options, _options(surrogate))
+    return FAMILIES[str(surrogate)](**options)
+
+
+def _check_options(surrogate: str, options: dict[str, Any], known: set[str]) -> None:
+    unknown = options.keys() - known
     if unknown:
         raise ValueError(
-            f"there is no argument {', '.join(sorted(unknown))}; the surrogate {surrogate!r} has "
-            f"the options {tuple(sorted(_options(surrogate)))}"
+            f"there is no argument {', '.join(sorted(unknown))}; the surrogate {surrogate} has "
+            f"the options {tuple(sorted(known))}"
         )
-    return FAMILIES[str(surrogate)](**options)
 
 
 def _options(name: Any) -> set[str]:
