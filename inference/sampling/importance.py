@@ -164,7 +164,7 @@ class Population(NamedTuple):
 
     @property
     def weights(self) -> np.ndarray:
-        """Of the points, whose sum is 1 [n]."""
+        """Weights of the points [n], whose sum is 1."""
         weights = np.exp(self.log_weights - self.log_weights.max())
         return weights / weights.sum()
 

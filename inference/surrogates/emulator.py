@@ -56,7 +56,7 @@ class Basis(NamedTuple):
         return np.sum(self.vectors**2, 0)
 
     def only(self, kept: np.ndarray) -> "Basis":
-        """With the components `kept`, bool [k], in front and all others empty."""
+        """The basis with the components `kept`, bool [k], in front and all others empty."""
         squared = self.squared
         vectors = np.zeros_like(self.vectors)
         vectors[:, : kept.sum()] = self.vectors[:, kept]
@@ -66,15 +66,15 @@ class Basis(NamedTuple):
         )
 
     def standardise(self, outputs: np.ndarray) -> np.ndarray:
-        """[n, m] -> [n, m]."""
+        """Outputs [n, m] less the centre, in units of the scale."""
         return (outputs - self.centre) / self.scale
 
     def scores(self, outputs: np.ndarray) -> np.ndarray:
-        """[n, m] -> [n, k]; 0 for empty components."""
+        """Scores [n, k] of outputs [n, m]; 0 for empty components."""
         return self.standardise(outputs) @ self.vectors / _divisor(self.squared)
 
     def outputs(self, scores: np.ndarray) -> np.ndarray:
-        """[k, n] -> [n, m]."""
+        """Outputs [n, m] of scores [k, n]."""
         return self.centre + self.scale * (scores.T @ self.vectors.T)
 
     def residuals(self, outputs: np.ndarray) -> np.ndarray:
@@ -139,7 +139,7 @@ class Size(NamedTuple):
     high: np.ndarray  # []
 
     def log(self, u: Any) -> Any:
-        """[n] at u [n, d]."""
+        """Log of the size [n] at u [n, d]."""
         return namespace(u).clip(predict_mean(self.gp, u)[0], self.low, self.high)
 
 
@@ -220,8 +220,8 @@ class Emulator(NamedTuple):
         return basis.outputs(mean), basis.scale * sd
 
     def latent_covariance(self, u: np.ndarray) -> np.ndarray:
-        """Of the emulator's own error in the mean output at u [d]: [m, m], run-to-run noise
-        apart."""
+        """Covariance [m, m] of the emulator's own error in the mean output at u [d], without
+        run-to-run noise."""
         basis = self.basis
         variance = predict(self.gp, u[None])[1][:, 0]
         standard = (basis.vectors * variance) @ basis.vectors.T
@@ -262,7 +262,7 @@ class Emulator(NamedTuple):
 
     @property
     def noise_variance(self) -> float:
-        """Of the run-to-run noise, at its size 1, over all standardised values together."""
+        """Variance of the run-to-run noise of size 1, summed over the standardised values."""
         return self.remainder.total + float(np.diag(self.noise) @ self.basis.squared)
 
     @property
@@ -379,8 +379,8 @@ def _left(basis: Basis, outputs: np.ndarray, spread: np.ndarray | None) -> Remai
 
 
 def _with_noise(emulator: Emulator, gp: GP, remainder: Remainder) -> Emulator:
-    """With these processes and what the components leave, plus the noise that was wrongly
-    attributed to them."""
+    """The emulator with these processes, and with the noise that was wrongly attributed to the
+    components in the remainder."""
     basis, noise = emulator.basis, np.exp(2.0 * gp.hyper.log_noise)
     taken = np.sum(noise * ((1.0 - emulator.excess) ** -2 - 1.0) * basis.squared)
     remainder = remainder._replace(white=remainder.white + float(taken) / len(basis.vectors))
@@ -455,7 +455,7 @@ def _absorbed_noise(basis: Basis, noise: np.ndarray, remainder: Remainder, n: in
 
 
 def resized(emulator: Emulator, units: Units) -> Emulator:
-    """The same with run-to-run noise whose size depends on the parameters, if errors show that.
+    """The emulator with run-to-run noise whose size depends on the parameters, if errors show it.
 
     Goldberg et al. (1998), with the most likely size: a process of the logarithm of each run's
     leave-one-out error. Where nothing is gained, noise is next to none, or no runs of equal

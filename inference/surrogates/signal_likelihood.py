@@ -40,7 +40,7 @@ class SignalLikelihood(NamedTuple):
     freedom: np.ndarray | None = None
 
     def padded(self) -> "SignalLikelihood":
-        """The same likelihood with numbers of scores of which there are few."""
+        """The likelihood with a number of scores that is a multiple of SCORES_TOGETHER."""
         g, k = self.estimate.shape
         total = SCORES_TOGETHER * max(1, -(-k // SCORES_TOGETHER))
         covariance = np.tile(np.eye(total), (g, 1, 1))
@@ -96,7 +96,7 @@ class SignalLikelihood(NamedTuple):
 def likelihood_of(
     emulator: Emulator, reduced: Reduced, box: tuple[np.ndarray, np.ndarray] | None = None
 ) -> SignalLikelihood:
-    """That of the components in use."""
+    """The likelihood of an emulator's components in use."""
     used, d = emulator.basis.used, emulator.gp.data.u.shape[1]
     state = SignalLikelihood(
         emulator.scores,
@@ -140,7 +140,7 @@ def _noise_factor(state: SignalLikelihood, size: Size, u: Any) -> Any:
 
 
 def scores(state: SignalLikelihood, u: Any) -> tuple[Any, Any]:
-    """Means and variances [n, k] of the scores at u; outside of the box, those at its end."""
+    """Means and variances [n, k] of the scores at u [n, d]; outside of the box, at its end."""
     mean, variance = predict(state.gp, namespace(u).clip(u, state.low, state.high))
     return mean.T * state.used, variance.T * state.used * state.doubt
 

@@ -30,11 +30,11 @@ class GivenNoise(NamedTuple):
 
     @property
     def covariance(self) -> np.ndarray:
-        """[m, m]"""
+        """Covariance of the values [m, m]."""
         return np.diag(self.white) + self.factors @ self.factors.T
 
     def draw(self, rng: np.random.Generator, n: int) -> np.ndarray:
-        """[n, m]"""
+        """n draws of the noise [n, m]."""
         m, q = self.factors.shape
         return (
             rng.normal(size=(n, m)) * np.sqrt(self.white) + rng.normal(size=(n, q)) @ self.factors.T
