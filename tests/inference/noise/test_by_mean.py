@@ -88,7 +88,7 @@ def test_what_is_shown_is_in_the_units_of_the_output():
 def test_means_go_to_the_scale_and_back():
     values = np.array([[0.5, 3.0, 200.0]])
     for law in (Poisson(), law_of(relative(0.2))):
-        scale = ByMean(law, values[0], np.ones(3))
+        scale = ByMean(law, values[0], np.array([1.0, 4.0, 9.0]))  # samples averaged
         np.testing.assert_allclose(scale.back(scale.of(values)), values, rtol=1e-9)
         # one sd is one
         step = scale.of(values + 0.05 * scale.sds(values)) - scale.of(values)
