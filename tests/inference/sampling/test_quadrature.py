@@ -7,7 +7,7 @@ import pytest
 from bolfi_liquids.inference._float64 import in_float64
 from bolfi_liquids.inference.gp.namespaces import log_sum_exp
 from bolfi_liquids.inference.sampling import quadrature
-from bolfi_liquids.inference.sampling.target import Length, Target
+from bolfi_liquids.inference.sampling.target import Target
 from scipy.stats import chisquare, norm
 
 integrate = in_float64(quadrature.integrate)
@@ -124,11 +124,3 @@ def test_total_variation_passes_independent_draws_and_fails_wrong_ones(d):
 def test_three_parameters_are_refused():
     with pytest.raises(ValueError, match="one or two parameters, got 3"):
         integrate(target(3, 0.1))
-
-
-def test_chains_have_the_shape_asked_for():
-    made = in_float64(quadrature.sample_quadrature)(
-        np.random.default_rng(0), target(2, 0.05), Length(chains=3, warmup=1, draws=7)
-    )
-    chains = in_float64(next)(made)
-    assert chains.u.shape == (3, 7, 2) and chains.stats["lp"].shape == (3, 7)
