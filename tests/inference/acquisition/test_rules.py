@@ -5,6 +5,7 @@ from dataclasses import replace
 import jax
 import numpy as np
 import pytest
+from bolfi_liquids.inference._float64 import in_float64
 from bolfi_liquids.inference.acquisition.rules import (
     RULES,
     exploration_width,
@@ -97,7 +98,7 @@ class Known(Surrogate):
 
 def test_draws_follow_the_posterior():
     """Means of 150 draws to five of their errors, the sd of both coordinates to four."""
-    rule = inference.PosteriorDraws(share=1.0)
+    rule = in_float64(inference.PosteriorDraws(share=1.0))  # as the engine calls it
     drawn = np.concatenate([rule(jax.random.key(i), Known(), 1) for i in range(150)])
     z = (drawn - Known.centre) / Known.sd
     assert (np.abs(z.mean(0)) < 5.0 / np.sqrt(150)).all()
@@ -126,7 +127,7 @@ def test_regions_where_runs_fail_are_avoided():
     failing = replace(surrogate, success=success)
 
     def among_failures(rule, of):
-        points = np.concatenate([rule(jax.random.key(k), of, 4) for k in range(4)])
+        points = np.concatenate([in_float64(rule)(jax.random.key(k), of, 4) for k in range(4)])
         return (np.linalg.norm(points - 0.4, axis=1) < 0.1).sum()
 
     for name in ("lcb", "draws", "eiv"):  # the others are made of these
