@@ -182,6 +182,12 @@ def check_callable(name: str, value: object) -> None:
     _check(name, value, value is None or callable(value), "a function or None")
 
 
+def check_choice(name: str, value: object, choices: tuple[str | None, ...]) -> None:
+    """Raise ValueError unless `value` is one of `choices`, texts or None."""
+    fits = isinstance(value, str | None) and value in choices
+    _check(name, value, fits, f"one of {choices}")
+
+
 def checked_number(name: str, value: object, fits: Callable[[float], bool], due: str) -> float:
     """`value`, a real number of any library that fits, as Python's own.
 

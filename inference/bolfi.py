@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from scipy.special import ndtr
 
 from ._float64 import in_float64
-from .acquisition.given import chosen, resolve_acquisition
 from .acquisition.replicates import next_replicate
+from .acquisition.rules import chosen, resolve_acquisition
 from .arguments import Unusable, check_flag, checked_integer, checked_mapping
 from .describe import describe
 from .history import (
@@ -34,10 +34,9 @@ from .simulations.failures import Failure, FailureKind, unusable
 from .simulations.job import BATCH
 from .simulations.returned import told_signals
 from .sobol import sobol, start_size
-from .surrogates.base import Acquisition, Family, Measured, TrainingData
+from .surrogates.base import Acquisition, Family, Measured, RunOutcomes, TrainingData
 from .surrogates.discrepancy import is_outlier
-from .surrogates.families import resolve
-from .surrogates.success import RunOutcomes
+from .surrogates.families import checked_surrogate, resolve
 from .surrogates.warnings import complain
 from .types import Theta
 
@@ -204,7 +203,8 @@ class Bolfi(Displayed):
         """theta [n, d] of the engine's choice, `designed` [m, d] being asked with them."""
         pending = np.concatenate([self._state.pending, designed])
         words = self._words()
-        self._learned = self.family.search(self._training_data(), words, self._learned)
+        found = self.family.search(self._training_data(), words, self._learned)
+        self._learned = checked_surrogate(found, self.family)
         repeated = next_replicate(self.history, pending) if self.family.replicates else None
         parts = [] if repeated is None else [repeated[None]]
         if n > len(parts):
@@ -354,7 +354,8 @@ class Bolfi(Displayed):
                 f"{self.told} told; tell more{self.history.last_error}"
             )
         started = time.perf_counter()
-        fitted = in_float64(self.family.learn)(self._training_data(), self._words())
+        learn = in_float64(self.family.learn)
+        fitted = checked_surrogate(learn(self._training_data(), self._words()), self.family)
         self._seconds += time.perf_counter() - started
         made = Fit(
             prior=self.prior,

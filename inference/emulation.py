@@ -26,13 +26,13 @@ class Emulation:
 
     def __init__(self, prior: Prior, learned: Emulator):
         self.prior, self._learned = prior, learned
-        self.left_out = vectors.left_out(learned)
+        self.left_out = learned.left_out()
         self.missed = learned.outputs - self.left_out
 
     @in_float64
     def predict(self, theta: Theta) -> np.ndarray:
         """Mean output [n, m] at theta, name -> [n]; outside the support, at its edge."""
-        return vectors.mean(self._learned, np.atleast_2d(self.prior.to_unit(theta)))
+        return self._learned.mean(np.atleast_2d(self.prior.to_unit(theta)))
 
 
 @in_float64

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..history import History
-from ..surrogates.noise.run_size import EQUAL_RUNS_TOLERANCE
+from ..surrogates.emulator import EQUAL_RUNS_TOLERANCE
 
 FIRST_REPLICATES = 2  # replicates to begin with, which tell a deterministic simulator
 REPLICATE_SHARE = 0.1  # of the simulations, where runs differ

@@ -7,22 +7,23 @@ point of a batch before it chooses the next (see `fantasize` of the surrogates).
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import jax
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from ..arguments import checked_number
+from ..arguments import check_called, checked_array, checked_number
 from ..gp.namespaces import log_sum_exp
 from ..gp.optimise import minimise_in_box
-from ..surrogates.base import Surrogate
+from ..surrogates.base import Acquisition, Family, Surrogate
 from .screen import ROUNDS, screen
 
 CANDIDATES = 128  # points among which a rule chooses
 INTEGRATION_NODES = 32  # points over which a variance is integrated
 MIN_EFFECTIVE = 32.0  # candidates that count, effectively
 MIN_POWER = 1e-6
+DIGITS, EDGE = 7, 1e-7  # of the prior quantiles that are asked, and how near the bounds
 
 
 def exploration_width(t: int, dimension: int) -> float:
@@ -233,3 +234,49 @@ RULES = {
     "cautious": CautiousDraws,
 }
 """Acquisitions by the name users give."""
+
+
+def resolve_acquisition(given: str | Acquisition | None, family: Family) -> Acquisition:
+    """The acquisition that a user means.
+
+    Args:
+        given: As in `Bolfi`; None is the family's own.
+        family: Of the surrogates by which it will choose.
+
+    Raises:
+        ValueError: an unknown name, nothing that can be called as an acquisition is, or "lcb"
+            for surrogates without a lower bound.
+    """
+    named: Any = family.acquisition if given is None else given
+    acquisition = RULES[named]() if isinstance(named, str) and named in RULES else named
+    if not callable(acquisition) or isinstance(acquisition, type):
+        raise ValueError(
+            f"acquisition must be one of {tuple(RULES)}, an object to be called or None, "
+            f"got {named!r:.100}"
+        )
+    check_called("acquisition", acquisition, "key", "surrogate", "n")
+    if isinstance(acquisition, LowerConfidenceBound) and not family.has_lower_bound:
+        others = tuple(name for name in RULES if name != "lcb")
+        raise ValueError(
+            "the acquisition 'lcb' needs surrogate='discrepancy', or another that has a lower "
+            f"bound, got {family!r:.100}; use one of {others}"
+        )
+    return cast(Acquisition, acquisition)
+
+
+def chosen(u: object, shape: tuple[int, int]) -> np.ndarray:
+    """The points to ask for, prior quantiles float64 [n, d], from what an acquisition returned.
+
+    They are coarser than rounding errors, so that another processor asks for the same.
+
+    Raises:
+        ValueError: of another shape, or not prior quantiles.
+    """
+    points = checked_array("what acquisition returns", u)
+    inside = (points >= -EDGE) & (points <= 1.0 + EDGE)  # NaN is neither
+    if points.shape != shape or not inside.all():
+        raise ValueError(
+            f"acquisition must return u of shape {shape}, prior quantiles from 0 to 1 of "
+            f"{shape[0]} points, got shape {points.shape}: {points}"
+        )
+    return np.clip(np.round(points, DIGITS), EDGE, 1.0 - EDGE)

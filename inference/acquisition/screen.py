@@ -13,7 +13,7 @@ from scipy.linalg import solve_triangular
 from scipy.special import ndtr, ndtri
 
 from ..gp.namespaces import log_sum_exp
-from ..sampling.mixture import log_prior
+from ..sampling.target import log_prior
 from ..sobol import sobol
 
 ROUND_POINTS = 64

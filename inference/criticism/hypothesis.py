@@ -12,7 +12,6 @@ from ..bolfi import Bolfi
 from ..gp.optimise import minimise_in_box
 from ..prior import Prior
 from ..result import Fit
-from ..surrogates.emulator import latent_covariance, predict
 from ..surrogates.measurement_noise import Layout, Nodes, Reduced
 from ..surrogates.output_vectors import Output
 from ..surrogates.signal import SignalFamily, SignalSurrogate
@@ -121,7 +120,7 @@ class Hypothesis:
     @in_float64
     def expected(self, u: np.ndarray) -> np.ndarray:
         """Expected values [n, m] at prior quantiles u [n, d]."""
-        return predict(self.surrogate.emulator, np.atleast_2d(u))[0]
+        return self.surrogate.emulator.predict(np.atleast_2d(u))[0]
 
     def misfit(self, metric: "Hypothesis") -> float:
         """Squared length of the difference under another hypothesis's covariance."""
@@ -169,8 +168,8 @@ def hypothesise(
         fit=fit,
         within=within,
         u=u,
-        difference=surrogate.observed - predict(emulator, u[None])[0][0],
-        latent=latent_covariance(emulator, u),
+        difference=surrogate.observed - emulator.predict(u[None])[0][0],
+        latent=emulator.latent_covariance(u),
         own=own,
         noise=known,
     )
@@ -218,17 +217,16 @@ def _sized(
 def _reduced(surrogate: SignalSurrogate, covariances: Sequence[np.ndarray]) -> Reduced:
     """Generalised least-squares estimates of the scores, one for each noise covariance [m, m]."""
     basis, g = surrogate.emulator.basis, len(covariances)
-    used, k = basis.used, basis.vectors.shape[1]
-    estimate, error = np.zeros((g, k)), np.tile(np.eye(k), (g, 1, 1))
+    used = basis.used
+    estimate, error = np.zeros((g, used)), np.zeros((g, used, used))
     log_weight, unexplained = np.zeros(g), np.zeros(g)
     vectors, target = basis.vectors[:, :used], basis.standardise(surrogate.observed)
     for i, covariance in enumerate(covariances):
         factor = np.linalg.cholesky(covariance / np.outer(basis.scale, basis.scale))
         white = solve_triangular(factor, np.column_stack([vectors, target]), lower=True)
-        if used:
-            error[i, :used, :used] = np.linalg.inv(white[:, :used].T @ white[:, :used])
-        estimate[i, :used] = error[i, :used, :used] @ (white[:, :used].T @ white[:, used])
-        left = white[:, used] - white[:, :used] @ estimate[i, :used]
+        error[i] = np.linalg.inv(white[:, :used].T @ white[:, :used])
+        estimate[i] = error[i] @ (white[:, :used].T @ white[:, used])
+        left = white[:, used] - white[:, :used] @ estimate[i]
         # the estimate's own normalisation belongs to N(estimate; scores, error)
         unexplained[i] = left @ left
         log_weight[i] = 0.5 * (np.linalg.slogdet(error[i])[1] - unexplained[i])

@@ -7,9 +7,8 @@ import numpy as np
 
 from ..arguments import check_kind
 from ..result import Fit, Recipe
-from ..surrogates.given_noise import given_sds
-from ..surrogates.noise.by_mean import law_of
-from ..surrogates.noise.scales import Plain
+from ..surrogates.noise.by_mean import Plain, law_of
+from ..surrogates.noise.given import given_sds
 from ..surrogates.signal import SignalFamily, SignalSurrogate
 from .criticise import Criticism, criticise
 from .experiment import Experiment
@@ -97,9 +96,9 @@ def _estimated(fit: Fit) -> Noise | None:
     found = fit.learned
     if not isinstance(found, SignalSurrogate) or not isinstance(found.scale, Plain):
         return None
-    output, alike = found.output, found.scale.stretch is None
+    output = found.output
     one_channel = output.series and not output.layout.channel.any()
-    if not (alike and one_channel and (output.counts == 1).all()):
+    if not (one_channel and (output.counts == 1).all()):
         return None
     weights = found.node_weights
     which = np.random.default_rng(0).choice(len(weights), DRAWS, p=weights)

@@ -132,12 +132,13 @@ def fantasize(gp: GP, u: np.ndarray, spread: np.ndarray | None = None) -> GP:
     The kriging believer of Ginsbourger et al. (2010): the mean stays, the variance shrinks.
 
     Args:
-        spread: As of `Data`, at u [m]; None where the data have none.
+        spread: As of `Data`, at u [m]; None is the median of the data's.
     """
     data = gp.data
     y = np.concatenate([data.y, predict(gp, u)[0]], axis=1)
-    if data.spread is not None and spread is not None:
-        spread = np.concatenate([data.spread, spread])
+    if data.spread is not None:
+        new = np.full(len(u), np.median(data.spread)) if spread is None else spread
+        spread = np.concatenate([data.spread, new])
     return condition(gp.hyper, Data(np.concatenate([data.u, u]), y, data.normal, spread))
 
 

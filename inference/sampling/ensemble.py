@@ -6,16 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import ndtr
 
-from .importance import explore, resampled
-from .mixture import UNIFORMS, Mixture, propose
-from .mixture import log_density as log_mixture
-from .target import (
-    LOG_ZERO,
-    Chains,
-    Length,
-    Target,
-    log_density,
-)
+from .importance import UNIFORMS, Mixture, explore, log_mixture, propose, resampled
+from .target import LOG_ZERO, Chains, Length, Target, log_density
 
 if TYPE_CHECKING:
     import emcee

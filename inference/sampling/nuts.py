@@ -15,9 +15,16 @@ from ..gp.process import GP
 from ..gp.process import padded as padded_process
 from ..types import LogLikelihood
 from .compilation_cache import kept_compilations
-from .importance import Population, explore, resampled
-from .mixture import UNIFORMS, Mixture, fit_mixture, propose
-from .mixture import log_density as log_mixture
+from .importance import (
+    UNIFORMS,
+    Mixture,
+    Population,
+    explore,
+    fit_mixture,
+    log_mixture,
+    propose,
+    resampled,
+)
 from .target import Chains, Length, Target, log_density
 
 BLOCK = 250  # draws of one call of the compiled program, whatever number is asked for

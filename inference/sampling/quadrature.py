@@ -9,14 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .target import (
-    LOG_ZERO,
-    NOWHERE_FINITE,
-    Chains,
-    Length,
-    Target,
-    log_likelihood,
-)
+from .target import LOG_ZERO, Chains, Length, Target, log_likelihood, somewhere_finite
 
 FIRST_GRID = {1: 256, 2: 32}  # cells along each axis at first
 CELL_TOLERANCE = 2e-5  # of a cell's error: its share of the mass, at most, times its unevenness^2
@@ -78,8 +71,6 @@ def integrate(target: Target, budget: int = QUICK_BUDGET) -> Quadrature:
         )
     log_mass = cells.value + d * np.log(cells.width)
     top = log_mass.max()
-    if top <= 0.5 * LOG_ZERO:
-        raise ValueError(NOWHERE_FINITE)
     mass = np.exp(log_mass - top)
     evidence = float(top + np.log(mass.sum()))
     return Quadrature(cells.low, cells.width, mass / mass.sum(), evidence, cells.value, spent)
@@ -89,7 +80,7 @@ def _first(target: Target) -> _Cells:
     d, n = target.dimension, FIRST_GRID[target.dimension]
     axis = np.arange(n) / n
     low = np.stack(np.meshgrid(*[axis] * d, indexing="ij"), -1).reshape(-1, d)
-    value = _finite(target, low + 0.5 / n)
+    value = somewhere_finite(_finite(target, low + 0.5 / n))
     grid = value.reshape([n] * d)
     uneven = np.zeros_like(grid)
     for j in range(d):

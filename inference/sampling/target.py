@@ -1,19 +1,15 @@
 """The posterior as samplers see it, and what they have in common."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..gp.namespaces import ndtr
+from ..gp.namespaces import namespace, ndtr
 from ..types import LogLikelihood
-from .mixture import log_prior
 
 LOG_ZERO = -1e300
 """Log density in place of none: finite, so that differences of two are numbers."""
-NOWHERE_FINITE = (
-    "the log likelihood is finite nowhere in the prior's box; nothing can be sampled. "
-    "Look at the surrogate's checks, and at the simulations that it learned from"
-)
 BATCH = 1024  # evaluations in one call, which bounds the memory
 
 
@@ -39,6 +35,11 @@ class Chains(NamedTuple):
     stats: dict[str, np.ndarray]  # name -> [chain, draw]
 
 
+def log_prior(x: Any) -> Any:
+    """Standard normal log density at x [n, d]: [n]."""
+    return -0.5 * namespace(x).sum(x**2, axis=-1) - 0.5 * x.shape[-1] * math.log(2.0 * math.pi)
+
+
 def log_density(log_likelihood: LogLikelihood, x: Any) -> Any:
     """Log posterior density [n] at x [n, d], u = Phi(x), for arrays of NumPy or JAX.
 
@@ -54,4 +55,18 @@ def log_likelihood(target: Target, u: np.ndarray) -> np.ndarray:
     for start in range(0, len(u), BATCH):
         rows = slice(start, start + BATCH)
         values[rows] = target.log_likelihood(u[rows])
+    return values
+
+
+def somewhere_finite(values: np.ndarray) -> np.ndarray:
+    """The log likelihoods of points that fill the prior, of which one must be finite.
+
+    Raises:
+        ValueError: none is.
+    """
+    if not (np.isfinite(values) & (values > 0.5 * LOG_ZERO)).any():
+        raise ValueError(
+            "the log likelihood is finite nowhere in the prior's box; nothing can be sampled. "
+            "Look at the surrogate's checks, and at the simulations that it learned from"
+        )
     return values

@@ -16,7 +16,13 @@ from ..prior import Prior
 from ..simulations.failures import Failure
 from ..types import LogLikelihood, Theta
 from .squared_difference import evaluate, sum_of_squares
-from .success import RunOutcomes
+
+
+class RunOutcomes(NamedTuple):
+    """Runs so far."""
+
+    u: np.ndarray  # [p, d]
+    succeeded: np.ndarray  # bool [p]
 
 
 class TrainingData(NamedTuple):

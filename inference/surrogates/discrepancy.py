@@ -7,32 +7,25 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from ..arguments import check_callable
+from ..arguments import check_callable, check_choice
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
-from ..gp.process import (
-    GP,
-    Data,
-    condition,
-    fantasize,
-    leave_one_out,
-    leave_one_out_errors,
-    predict,
-)
+from ..gp.process import GP, Data, condition, leave_one_out, predict
 from ..types import Discrepancy
 from . import warnings
 from .base import Family, Measured, TrainingData, flattened
-from .processes import OfProcesses
+from .processes import OfOneProcess, learn_success
 from .squared_difference import MIN_FREEDOM, evaluate, independent, numbers, squared_difference
-from .success import learn_success
 from .threshold import (
+    TRANSFORMS,
     Matched,
     Threshold,
     ThresholdLikelihood,
+    Transform,
+    candidates,
     check_rule,
     choose_threshold,
     matched,
 )
-from .transform import Transform, candidates, check_transform
 
 BETWEEN = 0.25  # of the least simulated discrepancy: the least that is taken for its minimum
 MIN_RESOLUTION = 1e-4  # of the spread of g(Delta)
@@ -55,32 +48,25 @@ class DiscrepancyScale(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class DiscrepancySurrogate(OfProcesses):
+class DiscrepancySurrogate(OfOneProcess):
     """GP of g(Delta); see `learn`.
 
     Attributes:
-        gp: The conditioned process.
+        values: The discrepancies.
         scale: g, and the standardisation of g(Delta).
-        discrepancy: What was learned from [n].
-        threshold: eps on the scale of g(Delta).
-        learned_at: Simulations known when the hyperparameters were found.
         chosen_at: Simulations known when the transform was chosen.
-        success: Where runs succeed, see `success.learn_success`.
-        width: Sd that the threshold has itself, on the scale of g(Delta).
+        threshold: eps on the scale of g(Delta).
+        width: Sd that the threshold has itself, on that scale.
         noisy: Whether the noise of g(Delta) alone makes the posterior wider than the data do, as
             far as the threshold is `Matched`.
-        resolution: Sd on the scale of g(Delta) from which doubt counts against a place, see
+        resolution: Sd on that scale from which doubt counts against a place, see
             `ThresholdLikelihood`; infinite while it shall attract runs.
         said: What the outputs, of which the surrogate knows nothing, have been found to lack.
     """
 
-    gp: GP
     scale: DiscrepancyScale
-    discrepancy: np.ndarray
-    threshold: float
-    learned_at: int
     chosen_at: int
-    success: GP | None = None
+    threshold: float = np.nan
     width: float = 0.0
     noisy: bool = False
     resolution: float = np.inf
@@ -89,7 +75,7 @@ class DiscrepancySurrogate(OfProcesses):
     @property
     def equal(self) -> bool:
         """Whether all discrepancies are the same, but for rounding."""
-        return bool(np.ptp(self.scale(self.discrepancy)) < 0.5)  # of what has an sd of 1
+        return bool(np.ptp(self.scale(self.values)) < 0.5)  # of what has an sd of 1
 
     @property
     def transform(self) -> Transform:
@@ -113,13 +99,12 @@ class DiscrepancySurrogate(OfProcesses):
 
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new g(Delta), its noise included, at quantiles u [n, d]: [n], [n]."""
-        (mean,), (variance,) = predict(self.gp, u)
-        sd = np.sqrt(variance + np.exp(2.0 * self.gp.hyper.log_noise[0]))
+        mean, sd = self.new_target(u)
         return self.scale.location + self.scale.spread * mean, self.scale.spread * sd
 
     def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
         """g(Delta) [n], capped at the worst run that was learned from."""
-        return self.transform(np.minimum(discrepancy, self.discrepancy.max()))
+        return self.transform(np.minimum(discrepancy, self.values.max()))
 
     def lower_bound(self, u: np.ndarray, width: float) -> np.ndarray:
         """mu - width sqrt(v) at u [n, d], v the variance of the latent mean (without noise).
@@ -129,10 +114,6 @@ class DiscrepancySurrogate(OfProcesses):
         (mean,), (variance,) = predict(self.gp, u)
         return mean - width * np.sqrt(variance) - self.log_success(u)
 
-    def fantasize(self, u: np.ndarray) -> "DiscrepancySurrogate":
-        """Condition on the predicted means at u [n, d], for points still being simulated."""
-        return replace(self, gp=fantasize(self.gp, u)) if len(u) else self
-
     def constants(self) -> dict[str, np.ndarray]:
         """The threshold, on the scale of g(Delta)."""
         return {"threshold": np.asarray(self.threshold)}
@@ -140,10 +121,6 @@ class DiscrepancySurrogate(OfProcesses):
     def described(self) -> list[str]:
         """The threshold, on the scale of the discrepancy."""
         return [f"threshold {float(self.transform.inverse(np.asarray(self.threshold))):.3g}"]
-
-    def checks(self) -> dict[str, np.ndarray]:
-        """Studentised leave-one-out errors `loo_z` [n, 1]."""
-        return {"loo_z": leave_one_out_errors(self.gp, len(self.discrepancy))}
 
     @property
     def fits(self) -> bool:
@@ -207,16 +184,14 @@ def learn(
         hyper, learned_at = previous.gp.hyper, previous.learned_at
         if n >= GROWTH * learned_at:
             hyper, learned_at = maximum_a_posteriori(data, hyper), n
-        learned = DiscrepancySurrogate(
-            condition(hyper, data), previous.scale, values, np.nan, learned_at, previous.chosen_at
-        )
+        learned = replace(previous, gp=condition(hyper, data), values=values, learned_at=learned_at)
         return with_threshold(learned, rule)
     options = [_standardise(option, values) for option in candidates(transform, values)]
     every = [Data(u, scale(values)[None], normal) for scale in options]
     fitted = [condition(maximum_a_posteriori(data), data) for data in every]
     scores = [_score(gp, scale, values) for gp, scale in zip(fitted, options, strict=True)]
     best = int(np.argmax(scores))
-    chosen = DiscrepancySurrogate(fitted[best], options[best], values, np.nan, n, n)
+    chosen = DiscrepancySurrogate(fitted[best], values, n, options[best], n)
     return with_threshold(chosen, rule)
 
 
@@ -235,24 +210,20 @@ def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> Discrepanc
     Raises:
         ValueError: the transform is undefined at the given threshold.
     """
-
-    def at_minimum() -> tuple[float, float]:
-        mean, sd = learned.predict(learned.u)
-        best = np.argmin(mean)
-        return float(mean[best]), float(sd[best])
-
-    if rule is None or isinstance(rule, Matched):
-        d = learned.u.shape[1]
-        matching = Matched(d + UNKNOWN_FREEDOM) if rule is None else rule
-        least = at_minimum()
-        mean, sd = (float(part[0]) for part in learned.predict(learned.best()[None]))
-        # between the runs the least may be lower, but not out of all proportion
-        if learned.transform.inverse(np.asarray(mean)) > BETWEEN * learned.discrepancy.min():
-            least = min(least, (mean, sd))
-        threshold, width = matched(matching, *least, learned.transform, d)
-        return replace(learned, threshold=threshold, width=width, noisy=width == 0.0)
-    threshold = choose_threshold(rule, learned.discrepancy, learned.transform, at_minimum)
-    return replace(learned, threshold=threshold, width=0.0, noisy=False)
+    mean, sd = learned.predict(learned.u)
+    i = np.argmin(mean)
+    least = float(mean[i]), float(sd[i])
+    if rule is not None and not isinstance(rule, Matched):
+        threshold = choose_threshold(rule, learned.values, learned.transform, least)
+        return replace(learned, threshold=threshold, width=0.0, noisy=False)
+    d = learned.u.shape[1]
+    matching = Matched(d + UNKNOWN_FREEDOM) if rule is None else rule
+    between, its_sd = (float(part[0]) for part in learned.predict(learned.best()[None]))
+    # between the runs the least may be lower, but not out of all proportion
+    if learned.transform.inverse(np.asarray(between)) > BETWEEN * learned.values.min():
+        least = min(least, (between, its_sd))
+    threshold, width = matched(matching, *least, learned.transform, d)
+    return replace(learned, threshold=threshold, width=width, noisy=width == 0.0)
 
 
 def _standardise(transform: Transform, values: np.ndarray) -> DiscrepancyScale:
@@ -304,7 +275,7 @@ class DiscrepancyFamily(Family):
     def __post_init__(self) -> None:
         check_rule(self.threshold)
         check_callable("discrepancy", self.discrepancy)
-        check_transform(self.transform)
+        check_choice("transform", self.transform, (*TRANSFORMS, None))
 
     @property
     def any_shape(self) -> bool:

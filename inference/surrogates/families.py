@@ -4,7 +4,7 @@ from dataclasses import fields
 from typing import Any, cast
 
 from ..arguments import check_called
-from .base import Family
+from .base import Family, Surrogate
 from .discrepancy import DiscrepancyFamily
 from .log_likelihood import LogLikelihoodFamily
 from .signal import SignalFamily
@@ -15,6 +15,9 @@ FAMILIES: dict[str, Any] = {
     "log_likelihood": LogLikelihoodFamily,
 }
 """Dataclasses by the name that users give; any other `Family` is given as an object."""
+
+BODILESS = ("u", "log_likelihood", "predict", "fantasize", "best")
+"""Members of `Surrogate` that each surrogate must write."""
 
 
 def resolve(surrogate: str | Family | None, options: dict[str, Any]) -> Family:
@@ -27,8 +30,7 @@ def resolve(surrogate: str | Family | None, options: dict[str, Any]) -> Family:
             name a discrepancy and an option of "signal".
     """
     if Family in type(surrogate).__mro__:
-        if options:
-            raise ValueError(f"give {tuple(options)} to {surrogate!r} itself")
+        _check_options(f"{surrogate!r:.100}, which takes its own,", options, set())
         family = cast(Family, surrogate)
         check_called("learn of surrogate", family.learn, "data", "key")
         return family
@@ -49,14 +51,41 @@ def resolve(surrogate: str | Family | None, options: dict[str, Any]) -> Family:
             f"surrogate must be one of {tuple(FAMILIES)}, an object of a class whose base is "
             f"`Family`, or None, got {surrogate!r:.100}"
         )
-    unknown = options.keys() - _options(surrogate)
+    _check_options(repr(surrogate), options, _options(surrogate))
+    return FAMILIES[str(surrogate)](**options)
+
+
+def _check_options(surrogate: str, options: dict[str, Any], known: set[str]) -> None:
+    unknown = options.keys() - known
     if unknown:
         raise ValueError(
-            f"there is no argument {', '.join(sorted(unknown))}; the surrogate {surrogate!r} has "
-            f"the options {tuple(sorted(_options(surrogate)))}"
+            f"there is no argument {', '.join(sorted(unknown))}; the surrogate {surrogate} has "
+            f"the options {tuple(sorted(known))}"
         )
-    return FAMILIES[str(surrogate)](**options)
 
 
 def _options(name: Any) -> set[str]:
     return {field.name for field in fields(FAMILIES[name])}
+
+
+def checked_surrogate(found: Any, family: Family) -> Surrogate:
+    """What a family learned.
+
+    Raises:
+        ValueError: it has not all members of `Surrogate`.
+    """
+    members = {*BODILESS, *(name for name in vars(Surrogate) if not name.startswith("_"))}
+    missing = sorted(name for name in members if not _has(found, name))
+    if missing:
+        raise ValueError(
+            f"{type(family).__name__} must learn a Surrogate, got {type(found).__name__} without "
+            f"{', '.join(missing)}; derive its class from `Surrogate`, and write these"
+        )
+    return found
+
+
+def _has(found: object, name: str) -> bool:
+    """Whether an object has a member that has a body; no property is evaluated."""
+    member = getattr(type(found), name, None)
+    stub = name in BODILESS and member is getattr(Surrogate, name, None)
+    return name in getattr(found, "__dict__", {}) or not (member is None or stub)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -10,21 +11,12 @@ from scipy.special import ndtr, ndtri
 
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.namespaces import namespace
-from ..gp.process import (
-    GP,
-    Data,
-    condition,
-    fantasize,
-    leave_one_out,
-    leave_one_out_errors,
-    predict,
-)
+from ..gp.process import GP, Data, condition, leave_one_out, predict
 from ..sampling.importance import explore
 from ..sampling.target import Target
 from ..simulations.failures import Failure, impossible, incomparable, not_finite
 from .base import Family, Measured, TrainingData
-from .processes import OfProcesses
-from .success import learn_success, log_success
+from .processes import OfOneProcess, learn_success, log_success
 from .warnings import EQUAL, UNCERTAIN, complaints
 
 NEAR = 40.0  # nats below the best, down to which a log likelihood must be right
@@ -82,7 +74,7 @@ class LevelLikelihood(NamedTuple):
 
     gp: GP
     scale: LogLikelihoodScale
-    success: GP | None = None  # see `success.learn_success`
+    success: GP | None = None  # see `processes.learn_success`
     doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts against a place
     optimism: np.ndarray = np.zeros(())
     rise: np.ndarray = np.full((), MAX_RISE)  # nats above the best value that count at most
@@ -124,50 +116,37 @@ class LevelLikelihood(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class LogLikelihoodSurrogate(OfProcesses):
-    """See `learn`.
+class LogLikelihoodSurrogate(OfOneProcess):
+    """A process of how far log likelihoods lie below the best one.
 
     Attributes:
-        log_likelihood: The process of depths, and how they become log likelihoods.
-        values: Log likelihoods that were learned from [n].
-        learned_at: How many were known when the hyperparameters were found.
+        values: The log likelihoods.
+        scale: How depths become log likelihoods.
+        hopeful: Whether it is to search with, and what is not known attracts runs.
     """
 
-    log_likelihood: LevelLikelihood
-    values: np.ndarray
-    learned_at: int
+    scale: LogLikelihoodScale
+    hopeful: bool = True
 
-    @property
-    def gp(self) -> GP:  # pyright: ignore  nobody sets it
-        return self.log_likelihood.gp
+    @cached_property
+    def log_likelihood(self) -> LevelLikelihood:  # pyright: ignore  nobody sets it
+        state = LevelLikelihood(self.gp, self.scale, self.success)
+        if self.hopeful:
+            return state._replace(doubt=np.zeros(()), optimism=np.asarray(OPTIMISM))
+        # where runs failed, what is extrapolated beyond their border must not outweigh
+        # log P(success)
+        return state._replace(rise=np.full((), np.inf)) if self.success is None else state
 
     @property
     def cautious(self) -> "LogLikelihoodSurrogate":
-        """The surrogate of a fit, to which what is not known explains nothing.
-
-        Where runs failed, what is extrapolated beyond their border must not outweigh
-        log P(success).
-        """
-        found = self.log_likelihood
-        rise = np.full((), np.inf) if found.success is None else found.rise
-        cautious = found._replace(doubt=np.ones(()), optimism=np.zeros(()), rise=rise)
-        return replace(self, log_likelihood=cautious)
-
-    def fantasize(self, u: np.ndarray) -> "LogLikelihoodSurrogate":
-        """Condition on the predicted means at u [n, d], for points still being simulated."""
-        if not len(u):
-            return self
-        noise = self.gp.data.spread
-        usual = None if noise is None else np.full(len(u), np.median(noise))
-        fantasized = fantasize(self.gp, u, usual)
-        return replace(self, log_likelihood=self.log_likelihood._replace(gp=fantasized))
+        """The surrogate of a fit, to which what is not known explains nothing."""
+        return replace(self, hopeful=False)
 
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new log likelihood, its noise included, at u [n, d]: [n], [n]."""
-        mean, variance = predict(self.gp, u)
-        sd = np.sqrt(variance[0] + np.exp(2.0 * self.gp.hyper.log_noise[0]))
-        scale, values = self.log_likelihood.scale, self.log_likelihood.scale.values(mean[0])
-        return values, scale.spread * scale.folds(values) * sd
+        mean, sd = self.new_target(u)
+        values = self.scale.values(mean)
+        return values, self.scale.spread * self.scale.folds(values) * sd
 
     def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
         """The log likelihoods [n]."""
@@ -175,16 +154,12 @@ class LogLikelihoodSurrogate(OfProcesses):
 
     def constants(self) -> dict[str, np.ndarray]:
         """The best log likelihood, and the sd of one estimate's noise near it, in nats."""
-        noise = self.log_likelihood.scale.spread * np.exp(self.gp.hyper.log_noise[0])
-        return {"best_log_likelihood": self.log_likelihood.scale.top, "noise": noise}
+        noise = self.scale.spread * np.exp(self.gp.hyper.log_noise[0])
+        return {"best_log_likelihood": self.scale.top, "noise": noise}
 
     def described(self) -> list[str]:
         """The noise of a log likelihood near the best one."""
         return [f"noise {float(self.constants()['noise']):.2g} nats"]
-
-    def checks(self) -> dict[str, np.ndarray]:
-        """Studentised leave-one-out errors `loo_z` [n, 1] of the compressed depths."""
-        return {"loo_z": leave_one_out_errors(self.gp, len(self.values))}
 
     def warnings(self, *, confirmed: bool = False) -> list[str]:
         """Warnings of the leave-one-out errors at depths that count, unless confirmed; and
@@ -200,49 +175,16 @@ class LogLikelihoodSurrogate(OfProcesses):
         exceeds the best value by MAX_RISE."""
         median = self.log_likelihood._replace(doubt=np.zeros(()), optimism=np.zeros(()))
         target = Target(median, self.u.shape[1])
-        population, scale = explore(np.random.default_rng(0), target), self.log_likelihood.scale
+        population = explore(np.random.default_rng(0), target)
         mean, variance = (part[0] for part in predict(self.gp, ndtr(population.x)))
-        unknown = scale.spread * np.sqrt(variance) > MAX_SD
-        extrapolated = scale.values(mean) > scale.top + MAX_RISE
+        unknown = self.scale.spread * np.sqrt(variance) > MAX_SD
+        extrapolated = self.scale.values(mean) > self.scale.top + MAX_RISE
         return float(population.weights @ (unknown | extrapolated))
 
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
         """One new log likelihood for each row of u [n, d]."""
         mean, sd = self.predict(u)
         return {"log_likelihood": mean + sd * rng.normal(size=mean.shape)}
-
-
-def learn(
-    u: np.ndarray,
-    values: np.ndarray,
-    sd: np.ndarray,
-    previous: LogLikelihoodSurrogate | None = None,
-    normal: np.ndarray | None = None,
-) -> LogLikelihoodSurrogate:
-    """Fit the surrogate: a process of how far log likelihoods lie below the best one.
-
-    Args:
-        u: Prior quantiles [n, d].
-        values: Log likelihoods [n], finite.
-        sd: Of their noise [n], NaN where it is not known; known ones tell how it varies, their
-            common size is learned.
-        previous: Learned from the first of these data; its hyperparameters and scale are kept
-            until the data have grown by GROWTH, or a value is better than its best by NEAR.
-        normal: Which parameters the kernel sees as normal scores [d], see `gp.process.coordinates`.
-    """
-    kept = previous if previous and len(u) < GROWTH * previous.learned_at else None
-    if kept is not None and values.max() < kept.log_likelihood.scale.top + NEAR:
-        scale, learned_at = kept.log_likelihood.scale, kept.learned_at
-        gp = condition(kept.gp.hyper, _data(u, values, sd, scale, normal))
-    else:
-        fitted = []
-        for scale in _scales(values):
-            data = _data(u, values, sd, scale, normal)
-            fitted.append((condition(maximum_a_posteriori(data), data), scale))
-        gp, scale = max(fitted, key=lambda one: _score(one[0], one[1], values))
-        learned_at = len(u)
-    hoped = LevelLikelihood(gp, scale, doubt=np.zeros(()), optimism=np.asarray(OPTIMISM))
-    return LogLikelihoodSurrogate(hoped, values, learned_at)
 
 
 def _scales(values: np.ndarray) -> list[LogLikelihoodScale]:
@@ -267,20 +209,16 @@ def _score(gp: GP, scale: LogLikelihoodScale, values: np.ndarray) -> float:
     return float(np.sum((density - np.log(scale.spread * scale.folds(values)))[near]))
 
 
-def _data(
-    u: np.ndarray,
-    values: np.ndarray,
-    sd: np.ndarray,
-    scale: LogLikelihoodScale,
-    normal: np.ndarray | None,
-) -> Data:
-    """Targets of the process; where some sds are known, its noise varies as they do."""
+def _targets(data: TrainingData, scale: LogLikelihoodScale) -> Data:
+    """Targets of the process; where some sds are known, its noise varies as they do, and their
+    common size is learned."""
+    values, sd = -data.discrepancy, data.features[:, 0]
     usual = np.nanmedian(sd) if np.isfinite(sd).any() else 0.0
     noise = None
     if usual > 0.0:
         share = np.maximum(np.where(np.isfinite(sd), sd / usual, 1.0), MIN_SD_SHARE)
         noise = (share / scale.folds(values)) ** 2
-    return Data(u, scale.targets(values)[None], normal, noise)
+    return Data(data.u, scale.targets(values)[None], data.normal, noise)
 
 
 @dataclass(frozen=True)
@@ -321,11 +259,24 @@ class LogLikelihoodFamily(Family):
     def search(
         self, data: TrainingData, key: np.ndarray, previous: LogLikelihoodSurrogate | None
     ) -> LogLikelihoodSurrogate:
-        """Optimistic: where a run was unlucky others are to be made."""
-        values, sd = -data.discrepancy, data.features[:, 0]
-        learned = learn(data.u, values, sd, previous, data.normal)
+        """Optimistic: where a run was unlucky others are to be made.
+
+        Hyperparameters and scale of `previous` are kept until the data have grown by GROWTH, or a
+        value is better than its best by NEAR.
+        """
+        values, n = -data.discrepancy, len(data.u)
+        kept = previous if previous and n < GROWTH * previous.learned_at else None
+        if kept is not None and values.max() < kept.scale.top + NEAR:
+            gp, scale = condition(kept.gp.hyper, _targets(data, kept.scale)), kept.scale
+            n = kept.learned_at
+        else:
+            fitted = []
+            for scale in _scales(values):
+                targets = _targets(data, scale)
+                fitted.append((condition(maximum_a_posteriori(targets), targets), scale))
+            gp, scale = max(fitted, key=lambda one: _score(one[0], one[1], values))
         success = learn_success(data.runs, data.normal)
-        return replace(learned, log_likelihood=learned.log_likelihood._replace(success=success))
+        return LogLikelihoodSurrogate(gp, values, n, scale, success=success)
 
     def learn(self, data: TrainingData, key: np.ndarray) -> LogLikelihoodSurrogate:
         return self.search(data, key, None).cautious

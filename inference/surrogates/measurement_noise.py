@@ -19,7 +19,6 @@ LEAST_OF_MISFIT = 1.0 / 32.0  # least sigma over the smallest expected misfit, w
 MOST = 2.0  # largest sigma over the larger of the two
 MOST_OF_NOISE = 8.0  # the same of a few numbers' noise, whose posterior has a heavy tail
 UNIT = 1e-3  # of the outputs' sd, added to the given noise: the misfit of one that is 0
-
 MIN_SIZE = 1e-4  # of a residual, in units of the outputs' sd: data are never without noise
 
 
@@ -49,7 +48,10 @@ class Nodes(NamedTuple):
     rho: np.ndarray  # [g]
 
 
-NO_MEASUREMENT_NOISE = Nodes(np.zeros(1), np.zeros(1))
+Weighted = tuple[Nodes, np.ndarray]
+"""Nodes and their log weights before anything is compared [g]."""
+
+NO_MEASUREMENT_NOISE: Weighted = Nodes(np.zeros(1), np.zeros(1)), np.zeros(1)
 
 
 class Reduced(NamedTuple):
@@ -92,6 +94,40 @@ def shrunk_covariance(residuals: np.ndarray, lost: int) -> Remainder:
     return Remainder(factors, max(mean - np.sum(factors**2) / m, 0.0))
 
 
+def unknown_noise(miss: float, residual: float | None, series: bool) -> Weighted:
+    """Nodes of noise that is not given.
+
+    Args:
+        miss: Smallest expected misfit.
+        residual: Sd of what no component makes of the data, where these are many.
+        series: Whether the values follow each other in time.
+    """
+    if residual is None:
+        correlations = FEW_CORRELATIONS if series else NO_CORRELATION
+        nodes = candidates(LEAST_OF_MISFIT * miss, MOST_OF_NOISE * miss, correlations)
+    else:
+        nodes = candidates(LEAST_OF_RESIDUAL * residual, MOST * max(residual, miss), CORRELATIONS)
+    return nodes, _correlation_weights(nodes)
+
+
+def misfit_beside(given: float, share: float, miss: float, series: bool) -> Weighted:
+    """Nodes of a misfit beside noise that is given, none in front.
+
+    The prior of the size is half-Cauchy in units of the noise, evenly spread where that is more.
+
+    Args:
+        given: Sd of the given noise, standardised.
+        share: Prior probability of a misfit, 0 < share < 1.
+        miss, series: As of `unknown_noise`.
+    """
+    correlations = FEW_CORRELATIONS if series else NO_CORRELATION
+    nodes = candidates(LEAST_OF_MISFIT * miss, MOST * miss, correlations)
+    ratio = nodes.sigma / (given + UNIT)
+    slab = ratio / (1.0 + ratio**2) * np.exp(_correlation_weights(nodes))
+    weights = np.append(1.0 - share, share * slab / slab.sum())
+    return Nodes(*(np.append(0.0, part) for part in nodes)), np.log(weights)
+
+
 def candidates(low: float, high: float, correlations: np.ndarray) -> Nodes:
     """The grid of nodes with sigmas from `low` to `high`, evenly in their logarithm."""
     count = max(int(np.ceil(np.log(high / low) / np.log(STEP))) + 1, 1)
@@ -99,25 +135,9 @@ def candidates(low: float, high: float, correlations: np.ndarray) -> Nodes:
     return Nodes(sigma.ravel(), rho.ravel())
 
 
-def correlation_weights(nodes: Nodes) -> np.ndarray:
+def _correlation_weights(nodes: Nodes) -> np.ndarray:
     """Log weights by which nodes even in arctanh(rho) stand for a prior even in rho."""
     return np.log1p(-(nodes.rho**2))
-
-
-def with_misfit(nodes: Nodes, given: float, share: float) -> tuple[Nodes, np.ndarray]:
-    """Nodes of a misfit beside noise that is given, none in front, and their log weights.
-
-    The prior of the size is half-Cauchy in units of the noise, evenly spread where that is more.
-
-    Args:
-        nodes: Sizes evenly spaced in their logarithm.
-        given: Sd of the given noise, standardised.
-        share: Prior probability of a misfit, 0 < share < 1.
-    """
-    ratio = nodes.sigma / (given + UNIT)
-    slab = ratio / (1.0 + ratio**2) * np.exp(correlation_weights(nodes))
-    weights = np.append(1.0 - share, share * slab / slab.sum())
-    return Nodes(*(np.append(0.0, part) for part in nodes)), np.log(weights)
 
 
 def residual_size(target: np.ndarray, vectors: np.ndarray) -> float:

@@ -53,11 +53,7 @@ class Output:
             ValueError: the (summarised) output has another shape than the observed one.
         """
         summarised = summarise(self.summary, output)
-        if summarised.shape != self.shape:
-            raise ValueError(
-                f"expected {'a summary' if self.summary else 'an output'} of shape {self.shape}, "
-                f"as observed, got {summarised.shape}"
-            )
+        check_shape("a summary" if self.summary else "an output", self.shape, summarised.shape)
         return self.average(summarised.ravel()[self.present])
 
     def average(self, samples: np.ndarray) -> np.ndarray:
@@ -91,6 +87,12 @@ class Output:
             mean = np.bincount(channel, variance) / np.bincount(channel)
             variance = mean[channel]
         return np.where(variance > 0, np.sqrt(variance), 1.0)
+
+
+def check_shape(what: str, observed: tuple[int, ...], simulated: tuple[int, ...]) -> None:
+    """Raise ValueError where what was simulated has another shape than what was observed."""
+    if observed != simulated:
+        raise ValueError(f"expected {what} of shape {observed}, as observed, got {simulated}")
 
 
 def summarise(summary: Summary | None, output: np.ndarray) -> np.ndarray:

@@ -17,50 +17,26 @@ from ..sobol import sobol
 from ..types import Discrepancy
 from . import warnings
 from .base import Family, Measured, TrainingData
-from .emulator import (
-    PREDICTED_SHARE,
-    Emulator,
-    EmulatorLimits,
-    borne_out,
-    emulate,
-    goes_on,
-    loo_errors,
-    noise_share,
-    noise_variance,
-    predict,
-    predictive_draws,
-    resized,
-    smallest_misfit,
-)
-from .given_noise import Covariance, GivenNoise, check_noise, given_noise
+from .emulator import PREDICTED_SHARE, Emulator, EmulatorLimits, emulate, resized, run_spread
 from .measurement_noise import (
-    CORRELATIONS,
-    FEW_CORRELATIONS,
-    LEAST_OF_MISFIT,
-    LEAST_OF_RESIDUAL,
     MIN_SIZE,
-    MOST,
-    MOST_OF_NOISE,
-    NO_CORRELATION,
     NO_MEASUREMENT_NOISE,
     Nodes,
     Reduced,
     Remainder,
-    candidates,
+    Weighted,
     correlated,
-    correlation_weights,
+    misfit_beside,
     reduce,
     residual_size,
-    with_misfit,
+    unknown_noise,
 )
-from .noise.by_mean import ByMean, SdOfMean, law_of
-from .noise.run_size import run_spread
-from .noise.scales import OutputScale, Plain, comparable, in_units
+from .noise.by_mean import ByMean, OutputScale, Plain, SdOfMean, law_of
+from .noise.given import Covariance, GivenNoise, check_noise, given_noise
 from .output_vectors import Output, Summary, describe, infinities, summarise
-from .processes import OfProcesses
+from .processes import OfProcesses, learn_success
 from .signal_likelihood import SignalLikelihood, likelihood_of, node_log_densities
 from .squared_difference import MIN_FREEDOM, evaluate, failed_on, sum_of_squares
-from .success import learn_success
 
 KEPT_NODES = 12  # nodes of unknown measurement noise that enter the likelihood
 SCREENED_POINTS = 128
@@ -68,7 +44,6 @@ MISFIT_POINTS = 1024  # among which the smallest misfit is looked for
 NEEDED = 0.95  # posterior probability of a misfit from which it is said
 LEAST_SEEN = 0.01  # of the outputs' sd, from which a misfit is worth a word
 MAX_COMPONENTS = 8
-LEFT_OF_NOISE = 0.02  # of the variance of noise by the mean, that components may leave
 SLOW = 0.9  # correlation of neighbouring samples from which noise looks like a signal
 
 
@@ -88,8 +63,8 @@ class SignalSurrogate(OfProcesses):
         box: Ends [d], [d] in prior quantiles of the box outside of which the likelihood vanishes;
             None is everywhere. Where hardly anything was simulated, the emulator knows least, and
             what it does not know counts as noise that explains anything.
-        success: Where runs succeed, see `success.learn_success`.
-        scale: Leads from the output's values to what the emulator knows.
+        success: Where runs succeed, see `processes.learn_success`.
+        scale: Leads from the output's values to the emulator's features.
     """
 
     emulator: Emulator
@@ -116,7 +91,7 @@ class SignalSurrogate(OfProcesses):
     def sure(self) -> SignalLikelihood:
         """The log likelihood, were the simulator the emulator's mean. What looks like run-to-run
         noise, but repeated runs do not bear out, is doubt, too."""
-        found, share = self, max(borne_out(self.emulator), MIN_SIZE**2)
+        found, share = self, max(self.emulator.borne_out, MIN_SIZE**2)
         if share < 1.0:
             white, factors = self.emulator.remainder.white, self.emulator.remainder.factors
             remainder = Remainder(np.sqrt(share) * factors, share * white)
@@ -138,7 +113,7 @@ class SignalSurrogate(OfProcesses):
         fantasized = fantasize(self.gp, u, run_spread(self.emulator.size, u))
         return replace(self, emulator=self.emulator._replace(gp=fantasized))
 
-    @property
+    @cached_property
     def node_weights(self) -> np.ndarray:
         """Posterior weights of the nodes, given the best parameters."""
         log_weights = node_log_densities(self.log_likelihood, self.best()[None])[0]
@@ -148,7 +123,7 @@ class SignalSurrogate(OfProcesses):
     @property
     def best_features(self) -> np.ndarray:
         """Predicted features at the best parameters, on the emulator's scale [m]."""
-        return predict(self.emulator, self.best()[None])[0][0]
+        return self.emulator.predict(self.best()[None])[0][0]
 
     @property
     def misfit_probability(self) -> float:
@@ -165,9 +140,9 @@ class SignalSurrogate(OfProcesses):
         return {
             "components": np.asarray(self.emulator.basis.used),
             "explained_variance": np.asarray(self.emulator.basis.explained),
-            "run_to_run_noise_share": np.asarray(noise_share(self.emulator)),
+            "run_to_run_noise_share": np.asarray(self.emulator.noise_share),
             # of the output's first value; a channel's noise is in proportion to its scale
-            "measurement_noise_sd": np.hypot(in_units(self.scale, best, misfit[None])[0, 0], given),
+            "measurement_noise_sd": np.hypot(self.scale.in_units(best, misfit[None])[0, 0], given),
             "measurement_noise_correlation": weights @ self.nodes.rho,
         }
 
@@ -182,12 +157,12 @@ class SignalSurrogate(OfProcesses):
 
         The sd holds the emulator's and the run-to-run variance, not measurement noise.
         """
-        mean, sd = predict(self.emulator, u)
-        return self.scale.back(mean), in_units(self.scale, mean, sd)
+        mean, sd = self.emulator.predict(u)
+        return self.scale.back(mean), self.scale.in_units(mean, sd)
 
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, components in use]."""
-        return {"loo_z": loo_errors(self.emulator)}
+        return {"loo_z": self.emulator.loo_errors()}
 
     @property
     def fits(self) -> bool:
@@ -205,8 +180,8 @@ class SignalSurrogate(OfProcesses):
                 return [warnings.EQUAL, *self._of_data()]
             fast = len(repeats) and not repeats.any()
             return [warnings.TOO_FAST if fast else warnings.UNPREDICTED, *self._of_data()]
-        said = [] if confirmed else warnings.complaints(loo_errors(self.emulator), "output")
-        said += warnings.noise_warnings(noise_share(self.emulator), repeats, sized)
+        said = [] if confirmed else warnings.complaints(self.emulator.loo_errors(), "output")
+        said += warnings.noise_warnings(self.emulator.noise_share, repeats, sized)
         if self._outside():
             said.append(warnings.OUTSIDE)
         elif self._missed():
@@ -257,18 +232,15 @@ class SignalSurrogate(OfProcesses):
     @property
     def _residual(self) -> float:
         """Root mean square of what no component can make of the data, standardised."""
-        basis = self.emulator.basis
-        return residual_size(basis.standardise(self.observed), basis.vectors[:, : basis.used])
+        return _residual(self.emulator, self.observed)
 
     def _outside(self) -> bool:
         """Whether the observed scores are twice as far out as any simulated ones, or what no
         component can make of the output exceeds what simulations differ by."""
-        basis = self.emulator.basis
-        used = slice(basis.used)
-        reach = np.abs(self.gp.data.y[used]).max(1)
-        error = np.sqrt(np.diagonal(self.reduced.covariance, axis1=1, axis2=2))[:, used]
-        far = np.abs(self.reduced.estimate[:, used]) > 2.0 * reach + 3.0 * error
-        varied = np.sum(basis.vectors**2) + self.emulator.remainder.total
+        reach = np.abs(self.emulator.scores.data.y).max(1)
+        error = np.sqrt(np.diagonal(self.reduced.covariance, axis1=1, axis2=2))
+        far = np.abs(self.reduced.estimate) > 2.0 * reach + 3.0 * error
+        varied = np.sum(self.emulator.basis.vectors**2) + self.emulator.remainder.total
         differ = np.sqrt(varied / len(self.observed))  # what simulations differ by
         far_off = self.output.long and self._residual > max(1.0, differ)
         if far.any(1).all() or not far_off:
@@ -283,7 +255,7 @@ class SignalSurrogate(OfProcesses):
         Noise that is known is drawn with the covariance `known`. NaN where nothing was observed;
         averaged values are repeated over their samples.
         """
-        values = predictive_draws(rng, self.emulator, u)
+        values = self.emulator.draw(rng, u)
         weights = self.node_weights
         which = rng.choice(len(weights), len(u), p=weights)
         nodes = Nodes(*(part[which] for part in self.nodes))
@@ -319,22 +291,25 @@ def observe(
         white = white + given.white / basis.scale**2
         factors = np.column_stack([factors, given.factors / basis.scale[:, None]])
     kept = None if previous is None else (previous.nodes, previous.log_prior)
-    nodes, log_weight = kept or _nodes(emulator, output, observed, given, misfit)
+    nodes, log_prior = kept or _nodes(emulator, output, observed, given, misfit)
     if emulator.equal:  # nothing to compare
-        reduced = Reduced(*(np.zeros((len(log_weight), *[0] * axes)) for axes in (1, 2, 0, 0, 0)))
+        reduced = Reduced(*(np.zeros((len(log_prior), *[0] * axes)) for axes in (1, 2, 0, 0, 0)))
     else:
         reduced = reduce((vectors, target, factors), white, output.layout, nodes)
-    own = noise_variance(emulator)
+    own, used = emulator.noise_variance, basis.used
     other = np.sum(white - remainder.white) + np.sum(factors[:, remainder.factors.shape[1] :] ** 2)
     other = other + len(target) * nodes.sigma**2
-    share = own / np.maximum(own + other, np.finfo(float).tiny)
-    reduced = reduced._replace(log_weight=reduced.log_weight + log_weight, share=share)
-    reduced = _widen(reduced, emulator)
-    if len(log_weight) > KEPT_NODES:
+    log_weight = reduced.log_weight + log_prior
+    reduced = reduced._replace(
+        covariance=reduced.covariance + emulator.noise[:used, :used],
+        log_weight=log_weight - log_weight.max(),
+        share=own / np.maximum(own + other, np.finfo(float).tiny),
+    )
+    if len(log_prior) > KEPT_NODES:
         kept = _keep(emulator, reduced, nodes)
         reduced = Reduced(*(part[kept] for part in reduced))
-        nodes, log_weight = Nodes(*(part[kept] for part in nodes)), log_weight[kept]
-    return SignalSurrogate(emulator, output, observed, given, nodes, log_weight, reduced)
+        nodes, log_prior = Nodes(*(part[kept] for part in nodes)), log_prior[kept]
+    return SignalSurrogate(emulator, output, observed, given, nodes, log_prior, reduced)
 
 
 def _nodes(
@@ -343,35 +318,22 @@ def _nodes(
     observed: np.ndarray,
     given: GivenNoise | None,
     misfit: float,
-) -> tuple[Nodes, np.ndarray]:
-    """Sizes and correlations that the unknown noise or misfit may have, and their log weights."""
+) -> Weighted:
+    """Sizes and correlations that the unknown noise or misfit may have."""
     if emulator.equal or (given is not None and not misfit):
-        return NO_MEASUREMENT_NOISE, np.zeros(1)
+        return NO_MEASUREMENT_NOISE
+    miss = emulator.smallest_misfit(observed, _screen(emulator, MISFIT_POINTS))
+    if given is None:
+        residual = _residual(emulator, observed) if output.long else None
+        return unknown_noise(miss, residual, output.series)
+    sd = float(np.sqrt(np.mean(given.variance / emulator.basis.scale**2)))
+    return misfit_beside(sd, misfit, miss, output.series)
+
+
+def _residual(emulator: Emulator, observed: np.ndarray) -> float:
+    """Root mean square of what no component can make of the data [m], standardised."""
     basis = emulator.basis
-    correlations = FEW_CORRELATIONS if output.series else NO_CORRELATION
-    miss = smallest_misfit(emulator, observed, _screen(emulator, MISFIT_POINTS))
-    low, high = LEAST_OF_MISFIT * miss, MOST_OF_NOISE * miss
-    if given is not None:
-        sd = float(np.sqrt(np.mean(given.variance / basis.scale**2)))
-        return with_misfit(candidates(low, MOST * miss, correlations), sd, misfit)
-    if output.long:
-        left = residual_size(basis.standardise(observed), basis.vectors[:, : basis.used])
-        low, high, correlations = LEAST_OF_RESIDUAL * left, MOST * max(left, miss), CORRELATIONS
-    nodes = candidates(low, high, correlations)
-    return nodes, correlation_weights(nodes)
-
-
-def _widen(reduced: Reduced, emulator: Emulator) -> Reduced:
-    """To all components, with the scores' run-to-run noise in the covariance; the largest weight
-    becomes 1."""
-    used, k = emulator.basis.used, emulator.basis.vectors.shape[1]
-    nodes = len(reduced.log_weight)
-    estimate = np.zeros((nodes, k))
-    estimate[:, :used] = reduced.estimate
-    covariance = np.tile(np.eye(k), (nodes, 1, 1))
-    covariance[:, :used, :used] = reduced.covariance + emulator.noise[:used, :used]
-    log_weight = reduced.log_weight - reduced.log_weight.max()
-    return reduced._replace(estimate=estimate, covariance=covariance, log_weight=log_weight)
+    return residual_size(basis.standardise(observed), basis.vectors[:, : basis.used])
 
 
 def _keep(emulator: Emulator, reduced: Reduced, nodes: Nodes) -> np.ndarray:
@@ -412,7 +374,7 @@ class SignalFamily(Family):
             None estimates it: as an AR(1) process where the output is a series, of at least 5
             samples without a summary.
         varying_noise: Whether the noise that the simulator makes itself may depend on the
-            parameters and on the mean, where runs show that it does.
+            parameters, where runs show that it does.
         misfit: Prior probability that the data are missed by more than the given noise, because
             the simulator errs or the noise is larger; its size is integrated out. 0 for never.
         components: At most.
@@ -469,14 +431,13 @@ class SignalFamily(Family):
             if signal is None or not np.isfinite(discrepancy[i]):
                 errors[i] = errors[i] or self._infinite_summary(signal)
                 continue
+            asked = "summary"
             try:
                 features[i] = output.values(signal)
-            except (Exception, SystemExit) as error:  # of the user's summary
-                errors[i] = failed_on("summary", signal, array, error)
-            try:
+                asked = "noise"  # the user's function of the mean
                 scale.check(features[i])
-            except (Exception, SystemExit) as error:  # of the user's function of the mean
-                errors[i], features[i] = failed_on("noise", signal, array, error), np.nan
+            except (Exception, SystemExit) as error:  # whatever the user's code raises
+                errors[i], features[i] = failed_on(asked, signal, array, error), np.nan
         failed = ~np.isfinite(features).all(1)
         return Measured(features, np.where(failed, np.nan, discrepancy), errors)
 
@@ -499,13 +460,14 @@ class SignalFamily(Family):
         self, data: TrainingData, key: np.ndarray, previous: SignalSurrogate | None
     ) -> SignalSurrogate:
         _, output, scale = data.observed
-        if previous is not None and goes_on(previous.emulator, previous.scale.of(data.features)):
-            scale = previous.scale
-        else:
+        features, units = scale.of(data.features), scale.unit(output)
+        if previous is not None and not previous.emulator.goes_on(features):
             previous = None
-            if self.varying_noise and isinstance(scale, Plain):
-                scale = scale.fitting(data.u, data.features, output.layout.channel)
-        emulator = self._emulator(data, output, scale, previous)
+        limits = EmulatorLimits(self.components, self.predicted, scale.left)
+        old = None if previous is None else previous.emulator
+        emulator = emulate(data.u, features, units, limits, old, data.normal)
+        if old is None and self.varying_noise:
+            emulator = resized(emulator, units)
         success = learn_success(data.runs, data.normal)
 
         def compared(at: np.ndarray | None) -> SignalSurrogate:
@@ -518,17 +480,3 @@ class SignalFamily(Family):
         for _ in range(scale.rounds - 1):
             found = compared(found.best_features)
         return found
-
-    def _emulator(
-        self,
-        data: TrainingData,
-        output: Output,
-        scale: OutputScale,
-        previous: SignalSurrogate | None,
-    ) -> Emulator:
-        left = LEFT_OF_NOISE if isinstance(scale, ByMean) else np.inf
-        limits = EmulatorLimits(self.components, self.predicted, left)
-        features, units = scale.of(data.features), comparable(scale, output)
-        old = None if previous is None else previous.emulator
-        found = emulate(data.u, features, units, limits, old, data.normal)
-        return found if old or not self.varying_noise else resized(found, units)

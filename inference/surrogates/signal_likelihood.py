@@ -9,10 +9,9 @@ import numpy as np
 
 from ..gp.namespaces import log_sum_exp, namespace
 from ..gp.process import GP, padded, predict
-from .emulator import Emulator
+from .emulator import Emulator, Size
 from .measurement_noise import Reduced
-from .noise.run_size import Size, log_size
-from .success import log_success
+from .processes import log_success
 
 SCORES_TOGETHER = 8  # by which the scores of padded states are counted
 WALL = 0.01  # of prior quantiles, beyond a box, over which the likelihood vanishes
@@ -31,7 +30,7 @@ class SignalLikelihood(NamedTuple):
     log_weight: np.ndarray  # [g]
     low: np.ndarray  # [d], ends of the box outside of which the likelihood vanishes
     high: np.ndarray
-    success: GP | None = None  # see `success.learn_success`
+    success: GP | None = None  # see `processes.learn_success`
     doubt: np.ndarray = np.ones(())  # the part of the emulator's variance that counts
     size: Size | None = None  # of the run-to-run noise, where it depends on the parameters
     # of size 1: its share of each node's noise [g], `Reduced.unexplained` [g], and values less
@@ -41,7 +40,7 @@ class SignalLikelihood(NamedTuple):
     freedom: np.ndarray | None = None
 
     def padded(self) -> "SignalLikelihood":
-        """The same likelihood with numbers of scores of which there are few."""
+        """The likelihood with a number of scores that is a multiple of SCORES_TOGETHER."""
         g, k = self.estimate.shape
         total = SCORES_TOGETHER * max(1, -(-k // SCORES_TOGETHER))
         covariance = np.tile(np.eye(total), (g, 1, 1))
@@ -97,13 +96,13 @@ class SignalLikelihood(NamedTuple):
 def likelihood_of(
     emulator: Emulator, reduced: Reduced, box: tuple[np.ndarray, np.ndarray] | None = None
 ) -> SignalLikelihood:
-    """That of the components in use."""
+    """The likelihood of an emulator's components in use."""
     used, d = emulator.basis.used, emulator.gp.data.u.shape[1]
     state = SignalLikelihood(
-        emulator.gp.only(slice(used)),
+        emulator.scores,
         np.ones(used),
-        reduced.estimate[:, :used],
-        reduced.covariance[:, :used, :used],
+        reduced.estimate,
+        reduced.covariance,
         reduced.log_weight,
         *(box or (np.zeros(d), np.ones(d))),
     )
@@ -136,12 +135,12 @@ def _noise_factor(state: SignalLikelihood, size: Size, u: Any) -> Any:
     Exact where a node has no other noise, or next to no run-to-run noise; between the two, all of
     a node's noise keeps its shape while it grows.
     """
-    spread = namespace(u).exp(2.0 * log_size(size, u))
+    spread = namespace(u).exp(2.0 * size.log(u))
     return 1.0 + state.share * (spread[:, None] - 1.0)
 
 
 def scores(state: SignalLikelihood, u: Any) -> tuple[Any, Any]:
-    """Means and variances [n, k] of the scores at u; outside of the box, those at its end."""
+    """Means and variances [n, k] of the scores at u [n, d]; outside of the box, at its end."""
     mean, variance = predict(state.gp, namespace(u).clip(u, state.low, state.high))
     return mean.T * state.used, variance.T * state.used * state.doubt
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from ..arguments import checked_array
 from ..simulations.failures import Failure, incomparable, raised
 from ..types import Discrepancy
-from .output_vectors import MIN_SERIES
+from .output_vectors import MIN_SERIES, check_shape
 
 MIN_FREEDOM = 3  # numbers more than parameters, from which the size of the noise can be told
 
@@ -41,9 +41,8 @@ def squared_difference(time: ArrayLike | None = None) -> Discrepancy:
 def _integrated(grid: np.ndarray | None, observed: np.ndarray, simulated: np.ndarray) -> float:
     observed = np.asarray(observed, np.float64)
     simulated = np.asarray(simulated, np.float64)
-    if observed.shape != simulated.shape:
-        raise ValueError(f"expected a signal of {observed.shape}, got {simulated.shape}")
-    weights = trapezoid_weights(np.isfinite(observed), grid)
+    check_shape("a signal", observed.shape, simulated.shape)
+    weights = _trapezoid_weights(np.isfinite(observed), grid)
     used = weights > 0
     with np.errstate(all="ignore"):  # of a run that blew up
         return float(np.sum(weights[used] * (observed[used] - simulated[used]) ** 2))
@@ -55,16 +54,13 @@ def sum_of_squares(observed: np.ndarray, simulated: np.ndarray) -> float:
     Raises:
         ValueError: shapes differ.
     """
-    if observed.shape != simulated.shape:
-        raise ValueError(
-            f"expected an output of shape {observed.shape}, as observed, got {simulated.shape}"
-        )
+    check_shape("an output", observed.shape, simulated.shape)
     there = np.isfinite(observed)
     with np.errstate(all="ignore"):  # of a run that blew up
         return float(np.sum((observed[there] - simulated[there]) ** 2))
 
 
-def trapezoid_weights(present: np.ndarray, time: np.ndarray | None) -> np.ndarray:
+def _trapezoid_weights(present: np.ndarray, time: np.ndarray | None) -> np.ndarray:
     """Weights of the trapezoidal rule over the samples that are present, channel by channel.
 
     Args:
@@ -73,9 +69,6 @@ def trapezoid_weights(present: np.ndarray, time: np.ndarray | None) -> np.ndarra
 
     Returns:
         [t, ...]; zero where absent.
-
-    Raises:
-        ValueError: lengths differ, or no channel has two samples.
     """
     steps = present.shape[0] if present.ndim else 0
     grid = np.arange(steps, dtype=np.float64) if time is None else time
@@ -84,18 +77,14 @@ def trapezoid_weights(present: np.ndarray, time: np.ndarray | None) -> np.ndarra
     columns = present.reshape(steps, -1) if steps else np.zeros((0, 0), bool)
     weights = np.zeros(columns.shape)
     for column, where in zip(weights.T, columns.T, strict=True):
-        column[where] = _weights(grid[where])
+        half = np.diff(grid[where]) / 2
+        column[where] = (np.pad(half, (0, 1)) + np.pad(half, (1, 0)))[: where.sum()]
     if not weights.any():
         raise ValueError(
             "observed must have two finite samples in some channel; for data that are not a "
             "time series give discrepancy="
         )
     return weights.reshape(present.shape)
-
-
-def _weights(time: np.ndarray) -> np.ndarray:
-    half = np.diff(time) / 2
-    return np.pad(half, (0, 1))[: time.size] + np.pad(half, (1, 0))[: time.size]
 
 
 def evaluate(

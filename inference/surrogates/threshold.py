@@ -1,4 +1,4 @@
-"""The approximate likelihood of a threshold on the discrepancy."""
+"""The approximate likelihood of a threshold on the discrepancy, or on a transform of it."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -9,8 +9,80 @@ from scipy.special import ndtr, ndtri, owens_t
 
 from ..gp.namespaces import log_ndtr, log_sum_exp, namespace
 from ..gp.process import GP, predict
-from .success import log_success
-from .transform import Transform
+from .processes import log_success
+
+ROUNDING = 1e-9  # of the largest discrepancy, below which differences tell nothing
+NEAR_SHARE = 0.25  # of the runs, to which a logarithm may be linear
+MATCHED_QUANTILE, LEAST_QUANTILE = 0.2, 0.02  # of a new discrepancy at the minimum
+FAR_BELOW = 1e-9  # of the way from a logarithm's end to the least discrepancy
+EXCESSES = np.geomspace(1e-8, 1e4, 400)  # over the least discrepancy, in units of it
+LOG_LIKELIHOOD_VARIANCE = 0.5  # of one error, where the discrepancy is minus a log likelihood
+NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(48)
+MIN_EXACT_SHARE = 1e-6  # of Phi(z), below which the difference with Owen's T has lost its digits
+
+
+class Transform(NamedTuple):
+    """g(Delta + offset); an offset is where a zero would break the log or the Jacobian, or where
+    the logarithm shall resolve the least discrepancies, whatever their sign."""
+
+    name: str
+    offset: float
+    signed: bool = False
+
+    def __call__(self, discrepancy: np.ndarray) -> np.ndarray:
+        return TRANSFORMS[self.name][0](np.asarray(discrepancy) + self.offset)
+
+    def inverse(self, value: np.ndarray) -> np.ndarray:
+        """Delta where g(Delta + offset) = value; 0 where that would be negative, unless some
+        discrepancies are."""
+        if self.name == "identity":
+            return np.asarray(value)
+        raw = np.exp(value) if self.name == "log" else np.maximum(value, 0.0) ** 2
+        return raw - self.offset if self.signed else np.maximum(raw - self.offset, 0.0)
+
+    def log_jacobian(self, discrepancy: np.ndarray) -> np.ndarray:
+        """log |dg / dDelta|."""
+        return TRANSFORMS[self.name][1](np.asarray(discrepancy) + self.offset)
+
+
+Function = Callable[[np.ndarray], np.ndarray]
+TRANSFORMS: dict[str, tuple[Function, Function]] = {
+    "identity": (lambda x: x, np.zeros_like),
+    "sqrt": (np.sqrt, lambda x: -np.log(2.0) - 0.5 * np.log(x)),
+    "log": (np.log, lambda x: -np.log(x)),
+}
+
+
+def candidates(name: str | None, discrepancy: np.ndarray) -> list[Transform]:
+    """The transforms that `discrepancy` admits.
+
+    Args:
+        name: One of TRANSFORMS, or None for all that apply, and a logarithm that is linear among
+            the least discrepancies, which adapts as the search closes in.
+        discrepancy: Finite values [n].
+
+    Raises:
+        ValueError: sqrt or log of negative discrepancies.
+    """
+    lowest = discrepancy.min()
+    if lowest < 0 and name not in (None, "identity"):
+        raise ValueError(
+            f"transform {name!r} needs discrepancies >= 0, got {lowest:.3g}; use 'identity'"
+        )
+    names = ("identity",) if lowest < 0 else tuple(TRANSFORMS) if name is None else (name,)
+    found = [Transform(n, 0.0 if n == "identity" else _offset(discrepancy)) for n in names]
+    near = float(np.quantile(discrepancy, NEAR_SHARE)) - lowest
+    if name is not None or near <= ROUNDING * np.abs(discrepancy).max():
+        return found
+    return [*found, Transform("log", near - lowest, bool(lowest < 0))]
+
+
+def _offset(discrepancy: np.ndarray) -> float:
+    """Half the smallest positive discrepancy if some are zero, else 0."""
+    if discrepancy.min() > 0:
+        return 0.0
+    positive = discrepancy[discrepancy > 0]
+    return float(positive.min()) / 2 if positive.size else 1.0
 
 
 class ThresholdLikelihood(NamedTuple):
@@ -20,7 +92,7 @@ class ThresholdLikelihood(NamedTuple):
     threshold: np.ndarray  # []
     width: np.ndarray  # [], sd that the threshold has itself
     resolution: np.ndarray  # [], sd of the latent mean from which doubt counts against a place
-    success: GP | None = None  # see `success.learn_success`
+    success: GP | None = None  # see `processes.learn_success`
     doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts
 
     def __call__(self, u: Any) -> Any:
@@ -65,6 +137,23 @@ class ThresholdLikelihood(NamedTuple):
         return (self.threshold - mean.T - doubt) / xp.sqrt(noisy), noisy, latent
 
 
+def log_both_below(z: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """Log chance that two standard normals of correlation r lie below z, both [...]."""
+    exact = ndtr(z) - 2.0 * owens_t(z, np.sqrt((1.0 - r) / (1.0 + r)))
+    kept = exact > MIN_EXACT_SHARE * ndtr(z)
+    both = np.log(np.where(kept, exact, 1.0))
+    return np.where(kept, both, _log_both_by_quadrature(z[..., None], r[..., None]))
+
+
+def _log_both_by_quadrature(z: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """`log_both_below` at z and r [..., 1]."""
+    peak = 2.0 * np.sqrt(r) / (1.0 + r) * np.maximum(-z, 0.0)
+    width = np.where(z < 0.0, np.sqrt((1.0 - r) / (1.0 + r) + r), 1.0)
+    w = peak + width * NODES
+    inside = 2.0 * log_ndtr((z + np.sqrt(r) * w) / np.sqrt(1.0 - r)) - 0.5 * (w**2 - NODES**2)
+    return log_sum_exp(inside + np.log(width * WEIGHTS / np.sqrt(2.0 * np.pi)))
+
+
 class Quantile(NamedTuple):
     """Threshold at the q quantile of the simulated discrepancies, 0 <= q <= 1."""
 
@@ -88,29 +177,28 @@ class Matched(NamedTuple):
 
 Threshold = str | float | Quantile | Predicted | Matched | None
 RULES = {"min_mean": Predicted(0.5), "min_observed": Quantile(0.0)}
-MATCHED_QUANTILE, LEAST_QUANTILE = 0.2, 0.02  # of a new discrepancy at the minimum
-FAR_BELOW = 1e-9  # of the way from a logarithm's end to the least discrepancy
-EXCESSES = np.geomspace(1e-8, 1e4, 400)  # over the least discrepancy, in units of it
-LOG_LIKELIHOOD_VARIANCE = 0.5  # of one error, where the discrepancy is minus a log likelihood
-NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(48)
-MIN_EXACT_SHARE = 1e-6  # of Phi(z), below which the difference with Owen's T has lost its digits
 
 
-def log_both_below(z: np.ndarray, r: np.ndarray) -> np.ndarray:
-    """Log chance that two standard normals of correlation r lie below z, both [...]."""
-    exact = ndtr(z) - 2.0 * owens_t(z, np.sqrt((1.0 - r) / (1.0 + r)))
-    kept = exact > MIN_EXACT_SHARE * ndtr(z)
-    both = np.log(np.where(kept, exact, 1.0))
-    return np.where(kept, both, _log_both_by_quadrature(z[..., None], r[..., None]))
-
-
-def _log_both_by_quadrature(z: np.ndarray, r: np.ndarray) -> np.ndarray:
-    """`log_both_below` at z and r [..., 1]."""
-    peak = 2.0 * np.sqrt(r) / (1.0 + r) * np.maximum(-z, 0.0)
-    width = np.where(z < 0.0, np.sqrt((1.0 - r) / (1.0 + r) + r), 1.0)
-    w = peak + width * NODES
-    inside = 2.0 * log_ndtr((z + np.sqrt(r) * w) / np.sqrt(1.0 - r)) - 0.5 * (w**2 - NODES**2)
-    return log_sum_exp(inside + np.log(width * WEIGHTS / np.sqrt(2.0 * np.pi)))
+def check_rule(rule: Threshold) -> None:
+    """Raise ValueError unless `rule` is a documented threshold rule."""
+    match rule:
+        case Quantile(q):
+            valid = 0.0 <= q <= 1.0
+        case Predicted(q):
+            valid = 0.0 < q < 1.0
+        case Matched(numbers):
+            valid = numbers > 0
+        case str():
+            valid = rule in RULES
+        case _:
+            number = isinstance(rule, float | int | np.number) and np.isfinite(rule)
+            valid = rule is None or number
+    if not valid:
+        raise ValueError(
+            f"threshold must be one of {tuple(RULES)}, Predicted(q) with 0 < q < 1, Quantile(q) "
+            f"with 0 <= q <= 1, Matched(numbers) with numbers > 0, a finite "
+            f"number on the discrepancy's scale or None, got {rule!r}"
+        )
 
 
 def matched(
@@ -150,52 +238,30 @@ def matched(
     return mean + z * sd, 0.0
 
 
-def check_rule(rule: Threshold) -> None:
-    """Raise ValueError unless `rule` is a documented threshold rule."""
-    if isinstance(rule, Matched):
-        valid = rule.numbers > 0
-    elif isinstance(rule, Quantile):
-        valid = 0.0 <= rule.q <= 1.0
-    elif isinstance(rule, Predicted):
-        valid = 0.0 < rule.q < 1.0
-    elif isinstance(rule, str):
-        valid = rule in RULES
-    else:
-        valid = rule is None or (isinstance(rule, float | int | np.number) and np.isfinite(rule))
-    if not valid:
-        raise ValueError(
-            f"threshold must be one of {tuple(RULES)}, Predicted(q) with 0 < q < 1, Quantile(q) "
-            f"with 0 <= q <= 1, Matched(numbers) with numbers > 0, a finite "
-            f"number on the discrepancy's scale or None, got {rule!r}"
-        )
-
-
 def choose_threshold(
     rule: str | float | Quantile | Predicted,
     discrepancy: np.ndarray,
     transform: Transform,
-    at_minimum: Callable[[], tuple[float, float]],
+    least: tuple[float, float],
 ) -> float:
     """The threshold on the transformed scale.
 
     Args:
-        rule: Predicted(q), the q quantile of a new discrepancy at the
-            simulated point where the surrogate's mean is least; "min_mean", that mean
-            (Gutmann and Corander 2016); a Quantile of the discrepancies so far; "min_observed", the
-            smallest of them; or a number on the discrepancy's own scale.
+        rule: Predicted(q); "min_mean", the mean where it is least (Gutmann and Corander 2016); a
+            Quantile; "min_observed", the smallest discrepancy; or a number on the discrepancy's own
+            scale.
         discrepancy: Finite values [n].
         transform: That of the surrogate.
-        at_minimum: Mean and sd of a new discrepancy at that simulated point where the mean is
-            least, on the transformed scale; called where the rule needs them. Elsewhere the mean
-            may extrapolate below anything that a discrepancy can be.
+        least: Mean and sd of a new discrepancy at the simulated point where the mean is least, on
+            the transformed scale. Elsewhere the mean may extrapolate below anything that a
+            discrepancy can be.
 
     Raises:
         ValueError: the transform is undefined at the given number.
     """
     rule = RULES[rule] if isinstance(rule, str) else rule
     if isinstance(rule, Predicted):
-        mean, sd = at_minimum()
-        return mean + sd * float(ndtri(rule.q))
+        return least[0] + least[1] * float(ndtri(rule.q))
     if isinstance(rule, Quantile):
         return float(transform(np.quantile(discrepancy, rule.q)))
     number = float(rule)  # pyright: ignore[reportArgumentType]  # `check_rule`

@@ -1,1 +1,1 @@
-"""Noise that is not the same everywhere: by the simulated mean, and by the parameters."""
+"""Measurement noise that users give."""

@@ -1,4 +1,4 @@
-"""Measurement noise whose size follows from the simulated mean."""
+"""Noise whose size follows from the simulated mean, and scales on which noise is even."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,8 +8,9 @@ from typing import ClassVar, cast
 import numpy as np
 from scipy.special import xlogy
 
-from ...arguments import checked_array, checked_number
-from ..given_noise import GivenNoise
+from ...arguments import check_choice, checked_array, checked_number
+from ..output_vectors import Output
+from .given import GivenNoise
 
 DECADES = np.linspace(-25.0, 25.0, 1001)  # logs of the means, over the largest observed one
 LEAST_STEP = 1e-12  # of the scale, from one of them to the next
@@ -18,6 +19,7 @@ HALF_STEP = 0.5  # sds, over which its slope and curvature are taken
 LEAST_CURVATURE = 0.1  # where it is not convex, as far from an observed value
 ROUNDING = 1e-9  # relative: a mean that is negative by less counts as 0
 LARGEST_COUNT = 1e18  # that NumPy draws
+LEFT_OF_NOISE = 0.02  # of the variance of noise by the mean, that components may leave
 
 SdOfMean = Callable[[np.ndarray], np.ndarray]
 
@@ -113,10 +115,59 @@ def law_of(noise: object) -> Law | None:
         ValueError: text other than "poisson".
     """
     if isinstance(noise, str):
-        if noise != "poisson":
-            raise ValueError(f'noise must be "poisson", a function or numbers, got {noise!r:.100}')
+        check_choice("noise, where it is text,", noise, ("poisson",))
         return Poisson()
     return Gaussian(cast(SdOfMean, noise)) if callable(noise) else None
+
+
+@dataclass(frozen=True, eq=False)
+class Plain:
+    """Values as they are, with noise that does not depend on them.
+
+    Attributes:
+        observed: [m]
+        given: The measurement noise; None where it is unknown.
+    """
+
+    observed: np.ndarray
+    given: GivenNoise | None
+
+    rounds: ClassVar[int] = 1  # how often `seen` must be asked until it stays the same
+    left: ClassVar[float] = np.inf  # see `EmulatorLimits.left`
+
+    def seen(self, at: np.ndarray | None) -> tuple[np.ndarray, GivenNoise | None]:
+        """The observed features [m] and their measurement noise, None where it is unknown.
+
+        Args:
+            at: Features around which this must be right [m]; None if they are not known yet.
+        """
+        return self.observed, self.given
+
+    def of(self, values: np.ndarray) -> np.ndarray:
+        """Values [n, m] as features [n, m]."""
+        return values
+
+    def back(self, features: np.ndarray) -> np.ndarray:
+        return features
+
+    def in_units(self, features: np.ndarray, sd: np.ndarray) -> np.ndarray:
+        """An sd of features [n, m] as one of their values, in the values' units."""
+        return sd
+
+    def unit(self, output: Output) -> Callable[[np.ndarray], np.ndarray]:
+        """Scales that make features comparable: features [n, m] -> [m]."""
+        return output.scale
+
+    def sds(self, values: np.ndarray) -> np.ndarray:
+        """Sd of the known measurement noise of mean values, in their units [n, m]."""
+        return np.zeros_like(values) + (0.0 if self.given is None else np.sqrt(self.given.variance))
+
+    def observe(self, rng: np.random.Generator, values: np.ndarray) -> np.ndarray:
+        """Known measurement noise added to mean values [n, m]."""
+        return values if self.given is None else values + self.given.draw(rng, len(values))
+
+    def check(self, values: np.ndarray) -> None:
+        """Raise ValueError if mean values [..., m] have no measurement noise of this kind."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +177,7 @@ class ByMean:
     There, the likelihood of each observed value is nearly Gaussian. `seen` is the Gaussian that has
     its slope and curvature at given means: iterated with the means that fit best, the posterior has
     the mode and the width of the exact one (Fisher's scoring; McCullagh and Nelder 1989, section
-    2.5). Its methods are those of `scales.Plain`, which documents them.
+    2.5). Its methods are those of `Plain`, which documents them.
 
     Attributes:
         law: Of the noise.
@@ -139,6 +190,7 @@ class ByMean:
     counts: np.ndarray
 
     rounds: ClassVar[int] = 3
+    left: ClassVar[float] = LEFT_OF_NOISE
 
     def __post_init__(self) -> None:
         self.law.check(self.observed)
@@ -182,9 +234,11 @@ class ByMean:
         means = (self.back(near + step) for step in steps)
         return np.stack([self.law.log_density(self.observed, mean, self.counts) for mean in means])
 
-    @property
-    def unit(self) -> np.ndarray:
-        return np.ones(len(self.observed))
+    def in_units(self, features: np.ndarray, sd: np.ndarray) -> np.ndarray:
+        return 0.5 * (self.back(features + sd) - self.back(features - sd))
+
+    def unit(self, output: Output) -> Callable[[np.ndarray], np.ndarray]:
+        return lambda features: np.ones(features.shape[1])
 
     def sds(self, values: np.ndarray) -> np.ndarray:
         return self.law.sd(values, self.counts)
@@ -194,3 +248,7 @@ class ByMean:
 
     def check(self, values: np.ndarray) -> None:
         self.law.check(values)
+
+
+OutputScale = Plain | ByMean
+"""Scales on which outputs are emulated: there, noise is the same everywhere."""

@@ -14,7 +14,6 @@ from bolfi_liquids.inference.criticism.signatures import scored_on_clean
 from bolfi_liquids.inference.criticism.study import Study
 from bolfi_liquids.inference.criticism.usual_residual import REPEATED
 from bolfi_liquids.inference.simulations import Compute
-from bolfi_liquids.inference.surrogates.emulator import latent_covariance
 from scipy.stats import binom, kstest, norm
 
 from bolfi_liquids import inference
@@ -172,7 +171,7 @@ def test_the_simulators_own_noise_is_known_to_be_smooth(banks):
 
 @in_float64
 def own_covariance(hypothesis):
-    return hypothesis.spread - latent_covariance(hypothesis.surrogate.emulator, hypothesis.u)
+    return hypothesis.spread - hypothesis.surrogate.emulator.latent_covariance(hypothesis.u)
 
 
 def located(banks, bump):

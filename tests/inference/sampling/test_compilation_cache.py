@@ -38,18 +38,11 @@ def compiled(home, **environment):
     return value, int(hits)
 
 
-def test_the_next_command_finds_what_was_compiled(tmp_path):
+def test_the_next_command_finds_what_was_compiled_within_and_nothing_else(tmp_path):
     first, none = compiled(tmp_path)
-    again, found = compiled(tmp_path)
-    assert (first, none) == (again, 0)
-    assert found > 0
-
-
-def test_what_is_compiled_outside_is_not_kept(tmp_path):
-    compiled(tmp_path)
-    kept = sorted(entry.name for entry in tmp_path.rglob("*-cache"))
-    again, found = compiled(tmp_path)
-    assert found == len(kept)  # all that is kept was compiled within
+    kept = list(tmp_path.rglob("*-cache"))
+    assert (none, len(kept) > 0) == (0, True)
+    assert compiled(tmp_path) == (first, len(kept))
 
 
 def test_the_environment_has_the_last_word(tmp_path):

@@ -1,8 +1,5 @@
 """Samplers against analytic posteriors and quadrature; what happens when they fall short."""
 
-import warnings
-
-import jax
 import numpy as np
 import pytest
 from arviz_stats.base import array_stats
@@ -63,6 +60,9 @@ def uncorrelated():
     return one(np.full(2, 0.45), np.eye(2) / 0.03)
 
 
+TARGETS = {"uncorrelated": uncorrelated, "bimodal": lambda: bimodal(2)}
+
+
 def sample(sampler, target, length=LENGTH, seed=1, extend=8):
     return draw_posterior(sampler, target, NAMES[: target.dimension], length, seed, extend)
 
@@ -80,7 +80,7 @@ def assert_means(values, truth):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["nuts", "emcee"])
-@pytest.mark.parametrize("d", [1, 2, 4])
+@pytest.mark.parametrize("d", [1, 4])
 def test_moments_of_a_correlated_gaussian(sampler, d):
     """Means and variances; a twin shifted by 0.3 sd must fail: with 2000 effective draws it is
     13 standard errors off, where the bound is 4.5."""
@@ -93,7 +93,7 @@ def test_moments_of_a_correlated_gaussian(sampler, d):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["nuts", "emcee"])
-@pytest.mark.parametrize("d", [1, *(pytest.param(d, marks=pytest.mark.slow) for d in (2, 4))])
+@pytest.mark.parametrize("d", [1, 4])
 def test_shares_of_modes_that_no_path_connects(sampler, d):
     """Chains that stay in the modes they start in give quarters, and R-hat far above 1.01. The
     twin: modes taken for equally likely are 15 standard errors off with 1000 effective draws."""
@@ -105,18 +105,6 @@ def test_shares_of_modes_that_no_path_connects(sampler, d):
     assert (first.mean(1) < 1.0).all() and (first.mean(1) > 0.0).all()  # each chain in both
     within = made.chains.u[first[..., 0] > 0.5]
     np.testing.assert_allclose(within.std(0), 0.03, rtol=0.1)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("sampler", ["nuts", "emcee", "quadrature"])
-def test_agrees_with_quadrature_on_a_banana(sampler):
-    """Sixteen equally probable bins: 4000 independent draws differ by 0.025, 1000 by 0.05."""
-    target = banana()
-    made = sample(sampler, target)
-    cells = in_float64(quadrature.integrate)(target, quadrature.THOROUGH_BUDGET)
-    assert not made.found
-    assert quadrature.total_variation(made.chains.u.reshape(-1, 2), cells) < 0.05
-    assert_means(made.chains.u, cells.mass @ (cells.low + 0.5 * cells.width[:, None]))
 
 
 @pytest.mark.slow
@@ -157,24 +145,22 @@ def test_compiles_once_for_all_fits_and_lengths(line_fit, prior, observed, simul
 
 @pytest.mark.slow
 @pytest.mark.parametrize("known", [np.asarray, lambda u: np.array([[float(u[0, 0]), 0.5]])])
-def test_nuts_refuses_a_likelihood_of_numpy_alone(known):
+def test_a_likelihood_of_numpy_alone_is_refused_by_nuts_and_not_by_emcee(known):
     target = Target(lambda u: -0.5 * np.sum(((known(u) - 0.45) / 0.03) ** 2, 1) + 0.0 * u[:, 0], 2)
     with pytest.raises(ValueError, match="'nuts' needs"):
         sample("nuts", target, SMALL)
+    if known is np.asarray:
+        assert not sample("emcee", target).found
 
 
 @pytest.mark.slow
-def test_emcee_needs_numpy_alone():
-    target = Target(lambda u: -0.5 * np.sum(((np.asarray(u) - 0.45) / 0.03) ** 2, 1), 2)
-    assert not sample("emcee", target).found
-
-
-@pytest.mark.slow
-def test_same_seed_same_draws():
-    for sampler in sampling.SAMPLERS:
-        a, b, c = (sample(sampler, gaussian(2), SMALL, seed).chains.u for seed in (0, 0, 1))
-        np.testing.assert_array_equal(a, b)
-        assert not np.array_equal(a, c)
+@pytest.mark.parametrize("sampler", sampling.SAMPLERS)
+def test_seeds_fix_the_draws_and_what_is_finite_nowhere_is_refused(sampler):
+    a, b, c = (sample(sampler, gaussian(2), SMALL, seed).chains.u for seed in (0, 0, 1))
+    np.testing.assert_array_equal(a, b)
+    assert not np.array_equal(a, c)
+    with pytest.raises(ValueError, match="finite nowhere"):
+        sample(sampler, one(np.full(2, 0.5), np.full((2, 2), np.nan)), SMALL)
 
 
 def slow(rng, target, length):
@@ -219,40 +205,24 @@ def test_goes_on_until_it_suffices(monkeypatch):
     assert made.chains.u.shape == (4, 3600, 2)
 
 
-def test_says_so_when_the_budget_does_not_suffice(monkeypatch):
-    monkeypatch.setitem(sampling.SAMPLERS, "slow", slow)
-    made = sample("slow", uncorrelated(), Length(4, 1, 1000), extend=2)
-    assert [*made.found] == [ConvergenceStatus.TOO_FEW_DRAWS]
-    assert "bulk effective sample size" in made.status and "2000" in made.status
-    assert made.steps == 2000
-
-
-def test_stuck_chains_are_not_silent(monkeypatch):
-    monkeypatch.setitem(sampling.SAMPLERS, "stuck", stuck)
-    made = sample("stuck", bimodal(2), extend=4)
-    assert ConvergenceStatus.TOO_FEW_DRAWS in made.found and "R-hat" in made.status
-    assert made.steps == 4000
-
-
-def test_disagreement_with_quadrature_is_not_silent(monkeypatch):
-    """Shifted by 0.7 sd, while R-hat and ESS are perfect."""
-    monkeypatch.setitem(sampling.SAMPLERS, "biased", biased)
-    made = sample("biased", uncorrelated())
-    assert [*made.found] == [ConvergenceStatus.QUADRATURE_DIFFERS]
-    assert made.checks["quadrature_total_variation"] > 0.2
-
-
-def test_divergences_are_not_silent(monkeypatch):
-    monkeypatch.setitem(sampling.SAMPLERS, "divergent", divergent)
-    made = sample("divergent", uncorrelated())
-    assert [*made.found] == [ConvergenceStatus.DIVERGENT] and "5." in made.status
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("sampler", ["nuts", "emcee", "quadrature"])
-def test_a_likelihood_that_is_nowhere_finite_is_an_error(sampler):
-    with pytest.raises(ValueError, match="finite nowhere"):
-        sample(sampler, one(np.full(2, 0.5), np.full((2, 2), np.nan)), SMALL)
+@pytest.mark.parametrize(
+    ("sampler", "target", "extend", "found", "said"),
+    [
+        (slow, "uncorrelated", 2, ConvergenceStatus.TOO_FEW_DRAWS, "2000"),
+        (stuck, "bimodal", 2, ConvergenceStatus.TOO_FEW_DRAWS, "R-hat"),
+        # shifted by 0.7 sd, while R-hat and ESS are perfect
+        (biased, "uncorrelated", 8, ConvergenceStatus.QUADRATURE_DIFFERS, "total variation 0."),
+        (divergent, "uncorrelated", 8, ConvergenceStatus.DIVERGENT, "5."),
+    ],
+    ids=lambda one: getattr(one, "__name__", None),
+)
+def test_draws_that_fall_short_are_not_silent(monkeypatch, sampler, target, extend, found, said):
+    monkeypatch.setitem(sampling.SAMPLERS, "planted", sampler)
+    made = sample("planted", TARGETS[target](), extend=extend)
+    assert found in made.found and said in made.status
+    if sampler is not stuck:  # these differ from quadrature, too
+        assert [*made.found] == [found]
+    assert made.steps == (2000 if found is ConvergenceStatus.TOO_FEW_DRAWS else 1000)
 
 
 @pytest.mark.slow
@@ -270,7 +240,7 @@ def right_half(state, u):
     return namespace(u).where(u[:, 0] < 0.45, np.nan, peaks(state, u))
 
 
-@pytest.mark.parametrize(("chains", "draws"), [(2, 8), (2, 50), (4, 400), (4, 1000)])
+@pytest.mark.parametrize(("chains", "draws"), [(2, 8), (4, 400)])
 def test_independent_draws_pass_the_limits(chains, draws):
     """At most one false alarm per 400 would fail with probability 0.01; chains half a standard
     deviation apart are caught from 400 draws on."""
@@ -287,32 +257,16 @@ def test_independent_draws_pass_the_limits(chains, draws):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sampler", ["nuts", "emcee", "quadrature"])
-def test_a_fit_agrees_with_its_quadrature(line_fit, sampler):
-    tree = line_fit.sample(sampler, seed=2)
-    posterior = tree["posterior"]
-    u = line_fit.prior.to_unit({n: posterior[n].to_numpy().ravel() for n in line_fit.prior.names})
-    learned = line_fit.learned
-    cells = in_float64(quadrature.integrate)(Target(learned.log_likelihood, 2))
-    assert quadrature.total_variation(u, cells) < 0.05
-    assert_means(u.reshape(4, 1000, 2), cells.mass @ (cells.low + 0.5 * cells.width[:, None]))
-    assert posterior.attrs["status"] == ConvergenceStatus.CONVERGED
-
-
-@pytest.mark.minutes
-def test_finds_separated_modes_of_a_fit(prior):
-    """The slope's modulus is observed, so plus and minus are equally likely; every chain must
-    visit both."""
-    fit = inference.fit(
-        lambda theta, seeds: np.stack([np.abs(theta["slope"]), theta["offset"]], 1),
-        prior,
-        np.full(2, 0.5),
-        budget=30,
-        noise=0.05,
-    )
-    slope = fit.sample()["posterior"]["slope"]
-    share = (slope > 0).mean("draw")
-    assert (share > 0.05).all() and (share < 0.95).all()
+@pytest.mark.parametrize("sampler", sampling.SAMPLERS)
+@pytest.mark.parametrize("posterior", ["a banana", "a fit"])
+def test_agrees_with_quadrature(line_fit, sampler, posterior):
+    """Sixteen equally probable bins: 4000 independent draws differ by 0.025, 1000 by 0.05."""
+    target = banana() if posterior == "a banana" else Target(line_fit.learned.log_likelihood, 2)
+    made = sample(sampler, target, seed=2)
+    cells = in_float64(quadrature.integrate)(target, quadrature.THOROUGH_BUDGET)
+    assert not made.found
+    assert quadrature.total_variation(made.chains.u.reshape(-1, 2), cells) < 0.05
+    assert_means(made.chains.u, cells.mass @ (cells.low + 0.5 * cells.width[:, None]))
 
 
 def test_log_prob_is_prior_times_likelihood(line_fit):
@@ -331,23 +285,10 @@ def test_log_prob_is_prior_times_likelihood(line_fit):
     assert line_fit.log_prob({"slope": 0.2, "offset": 0.7}).shape == ()
 
 
-@pytest.mark.slow
-def test_the_global_precision_stays(line_fit):
-    before = jax.config.jax_enable_x64
-    line_fit.sample("nuts", draws=50, warmup=50)
-    assert jax.config.jax_enable_x64 is before is False
-    assert jax.numpy.zeros(1).dtype == np.float32
-
-
 @pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"sampler": "gibbs"}, "sampler must be one of"),
-        ({"chains": 1}, "chains must be an integer from 2"),
-        ({"draws": 1}, "draws must be an integer from 4"),
-        ({"extend": 0}, "extend must be an integer from 1"),
-    ],
+    ("option", "value"),
+    [("sampler", "gibbs"), ("chains", 1), ("draws", 3), ("extend", 0), ("warn", "yes")],
 )
-def test_bad_options_are_refused(line_fit, options, message):
-    with pytest.raises(ValueError, match=message), warnings.catch_warnings():
-        line_fit.sample(**options)
+def test_bad_options_are_refused(line_fit, option, value):
+    with pytest.raises(ValueError, match=f"{option} must be"):
+        line_fit.sample(**{option: value})

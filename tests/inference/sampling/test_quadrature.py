@@ -7,7 +7,7 @@ import pytest
 from bolfi_liquids.inference._float64 import in_float64
 from bolfi_liquids.inference.gp.namespaces import log_sum_exp
 from bolfi_liquids.inference.sampling import quadrature
-from bolfi_liquids.inference.sampling.target import Length, Target
+from bolfi_liquids.inference.sampling.target import Target
 from scipy.stats import chisquare, norm
 
 integrate = in_float64(quadrature.integrate)
@@ -51,8 +51,7 @@ def target(d, sd, apart=True):
     return Target(partial(peaks, (centres, np.full((2, d), sd))), d)
 
 
-@pytest.mark.parametrize("d", [1, 2])
-@pytest.mark.parametrize("sd", [0.05, 0.002])
+@pytest.mark.parametrize(("d", "sd"), [(1, 0.002), (2, 0.05), (2, 0.002)])
 def test_evidence_and_moments_of_a_peak(d, sd):
     cells = integrate(target(d, sd, apart=False))
     assert abs(cells.log_evidence) < 2e-3
@@ -64,8 +63,7 @@ def test_evidence_and_moments_of_a_peak(d, sd):
     np.testing.assert_allclose(np.sum(cells.width**d), 1.0)  # cells fill the box
 
 
-@pytest.mark.parametrize("d", [1, 2])
-@pytest.mark.parametrize("sd", [0.05, 0.002])
+@pytest.mark.parametrize(("d", "sd"), [(1, 0.05), (2, 0.002)])
 def test_marginals_with_two_separate_modes(d, sd):
     cells = integrate(target(d, sd))
     edges = np.concatenate([[0.0], 0.31 + sd * np.linspace(-2.0, 2.0, 9), [0.5, 1.0]])
@@ -82,12 +80,6 @@ def test_agrees_with_a_dense_grid_on_a_banana():
     assert cells.log_evidence == pytest.approx(np.log(density.mean()), abs=5e-3)
     exact = (density.sum(0) / density.sum()).reshape(20, -1).sum(1)
     np.testing.assert_allclose(marginal(cells, 1, np.linspace(0.0, 1.0, 21)), exact, atol=2e-3)
-
-
-def test_a_flat_posterior_needs_the_first_grid_only():
-    cells = integrate(target(2, 1e3))
-    assert cells.evaluations == 32**2
-    np.testing.assert_allclose(cells.mass, 1.0 / 32**2, rtol=1e-3)
 
 
 def test_what_is_not_finite_has_no_mass():
@@ -121,32 +113,14 @@ def test_total_variation_passes_independent_draws_and_fails_wrong_ones(d):
     distances = [quadrature.total_variation(exact(1000), cells) for _ in range(20)]
     assert max(distances) < limit
     assert np.mean(distances) < 0.5 * limit
+    many = quadrature.draw(rng, cells, 10**5)[0]  # independent ones: 0.005
+    assert quadrature.total_variation(many, cells) < 0.013
     assert quadrature.total_variation(exact(1000, share=1.0), cells) > limit
     assert quadrature.total_variation(exact(4000, sd=0.03), cells) > quadrature.largest_expected(
         4000
     )
 
 
-def test_equal_bins_are_equally_probable():
-    """A million draws, 16 bins: total variation of independent ones is 0.0015."""
-    cells = integrate(target(2, 0.05))
-    u, _ = quadrature.draw(np.random.default_rng(1), cells, 10**6)
-    assert quadrature.total_variation(u, cells) < 0.004
-
-
 def test_three_parameters_are_refused():
     with pytest.raises(ValueError, match="one or two parameters, got 3"):
         integrate(target(3, 0.1))
-
-
-def test_chains_have_the_shape_asked_for():
-    source = in_float64(
-        lambda: next(
-            quadrature.sample_quadrature(
-                np.random.default_rng(0), target(2, 0.05), Length(chains=3, warmup=1, draws=7)
-            )
-        )
-    )
-    chains = source()
-    assert chains.u.shape == (3, 7, 2)
-    assert chains.stats["lp"].shape == (3, 7)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
-from bolfi_liquids.inference.surrogates.transform import Transform, candidates
+from bolfi_liquids.inference.surrogates.threshold import Transform, candidates
 
 pytestmark = pytest.mark.slow
 
@@ -101,15 +101,6 @@ def test_the_threshold_is_not_taken_where_nothing_was_simulated():
     u = u[u.sum(1) < 1.1]
     fitted = learn(u, 5.0 - 4.0 * u.sum(1), "identity")
     assert fitted.predict(np.ones((1, 2)))[0] < 0.0 < fitted.threshold
-
-
-def test_fantasizing_keeps_the_mean_and_shrinks_the_variance():
-    u = sobol(0, 0, 10, 2)
-    fitted = learn(u, bowl(u, np.random.default_rng(0), 1.0))
-    new = np.array([[0.9, 0.1]])
-    fantasized = fitted.fantasize(new)
-    np.testing.assert_allclose(fantasized.predict(new)[0], fitted.predict(new)[0], rtol=1e-9)
-    assert fantasized.predict(new)[1] < fitted.predict(new)[1]
 
 
 def test_hyperparameters_wait_until_the_data_have_grown_by_a_third():

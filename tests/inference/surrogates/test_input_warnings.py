@@ -17,7 +17,6 @@ LIMIT = 0.8
     ("observed", "value"),
     [
         (np.maximum(SEEN, LIMIT), "0.8"),
-        (np.where(SEEN < LIMIT, 0.0, SEEN), "0"),
         (np.minimum(SEEN, LIMIT), "0.8"),
     ],
 )
@@ -31,13 +30,10 @@ def test_data_cut_off_at_a_limit_are_told(observed, value):
 @pytest.mark.parametrize(
     ("observed", "simulated"),
     [
-        (SEEN, DECAY),
         (np.maximum(SEEN, LIMIT), np.maximum(DECAY, LIMIT)),  # the simulator cuts off, too
         (np.where(SEEN < LIMIT, np.nan, SEEN), DECAY),
-        (np.round(SEEN), DECAY),
         (np.round(SEEN, 1), DECAY + 0.04),
         (np.random.default_rng(0).poisson(DECAY).astype(float), DECAY),
-        (np.ones(24), DECAY),
         (np.array(3.0), np.array(3.1)),
     ],
 )
@@ -45,20 +41,16 @@ def test_data_that_repeat_for_another_reason_are_not(observed, simulated):
     assert censored_warnings(observed, simulated) == []
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_losses_that_all_lie_beyond_what_was_observed_are_told(sign):
+@pytest.mark.parametrize(("sign", "side"), [(1.0, "below"), (-1.0, "above")])
+def test_losses_that_all_lie_beyond_what_was_observed_are_told(sign, side):
     losses = sign * (1.3 + np.linspace(0.0, 2.0, 30) ** 2)[:, None]
     (said,) = unreached_warnings(np.zeros(1), losses, 0.0)
-    side = "below" if sign > 0.0 else "above"
-    assert f"{side} all 30 simulated ones, 1.3 from the nearest" in said and "discrepancy=" in said
+    assert f"{side} all 30 simulated ones, 1.3 from the nearest" in said
     assert unreached_warnings(np.zeros(1), losses, 0.5) == []  # noise reaches as far
     assert unreached_warnings(np.zeros(2), np.column_stack([losses, losses]), 0.0) == []
-
-
-@pytest.mark.parametrize("observed", [-0.2, 0.5, 5.0, 10.0])
-def test_a_number_within_or_near_what_was_simulated_is_not(observed):
     runs = np.linspace(0.0, 10.0, 40)[:, None]
-    assert unreached_warnings(np.array([observed]), runs, 0.0) == []
+    for seen in (-0.2, 0.5, 10.0):  # within what was simulated, or near it
+        assert unreached_warnings(np.array([sign * seen]), sign * runs, 0.0) == []
 
 
 PRIOR = inference.Prior({"level": dist.Uniform(1.0, 3.0)})
@@ -95,15 +87,6 @@ def test_unlike_signals_of_one_seed_are_runs_of_their_own(prior, observed, simul
     np.testing.assert_array_equal(fit.training_mask, np.arange(24) < 16)
     (said,) = [said for said in fit.warnings if "seed" in said]
     assert said.startswith("8 of 24 simulations have theta and seed of an earlier one")
-
-
-def test_one_seed_at_many_parameters_and_copies_are_as_they_should_be(prior, observed, simulate):
-    engine = inference.Bolfi(prior, observed)
-    theta = engine.ask(8)
-    for _ in range(2):
-        engine.tell(theta, simulate(theta, [5] * 8), [5] * 8)
-    assert engine.succeeded == 8
-    assert not any("seed" in said for said in engine.fit(warn=False).warnings)
 
 
 def quiet_log(signal):

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference.surrogates.measurement_noise import (
     CORRELATIONS,
+    STEP,
     Layout,
     Nodes,
     candidates,
     correlated,
+    misfit_beside,
     reduce,
     residual_size,
     shrunk_covariance,
@@ -76,6 +78,14 @@ def test_evidence_finds_size_and_correlation_of_the_noise():
     assert abs(weight @ nodes.rho - 0.6) < 0.2
 
 
+def test_a_misfit_is_as_probable_as_said_and_most_of_all_as_large_as_the_given_noise():
+    nodes, log_weight = misfit_beside(0.3, 0.1, 2.0, False)
+    weight = np.exp(log_weight)
+    assert nodes.sigma[0] == 0.0 and weight[0] == pytest.approx(0.9)
+    assert weight.sum() == pytest.approx(1.0)
+    assert abs(np.log(nodes.sigma[1:][np.argmax(weight[1:])] / 0.3)) < np.log(STEP)
+
+
 def test_white_residuals_stay_white_and_smooth_ones_keep_their_shape():
     rng = np.random.default_rng(0)
     n, m = 30, 60
@@ -90,9 +100,10 @@ def test_white_residuals_stay_white_and_smooth_ones_keep_their_shape():
     assert smooth.white < 0.15 * np.mean(shape**2)
 
 
-@pytest.mark.parametrize("lost", [3, 4])
-def test_no_freedom_or_no_residual_is_no_noise(lost):
-    residuals = np.random.default_rng(0).normal(size=(3, 5)) if lost == 4 else np.zeros((6, 5))
-    found = shrunk_covariance(residuals, lost)
-    assert not found.factors.any()
-    assert found.white == 0.0
+def test_no_freedom_or_no_residual_is_no_noise():
+    for residuals, lost in (
+        (np.random.default_rng(0).normal(size=(3, 5)), 4),
+        (np.zeros((6, 5)), 3),
+    ):
+        found = shrunk_covariance(residuals, lost)
+        assert not found.factors.any() and found.white == 0.0

@@ -3,7 +3,8 @@
 import numpy as np
 import numpyro.distributions as dist
 from bolfi_liquids.inference.sobol import sobol
-from bolfi_liquids.inference.surrogates.success import RunOutcomes, learn_success, log_success
+from bolfi_liquids.inference.surrogates.base import RunOutcomes
+from bolfi_liquids.inference.surrogates.processes import learn_success, log_success
 
 from bolfi_liquids import inference
 
@@ -36,16 +37,8 @@ def test_no_mass_lies_where_runs_fail():
     prior = inference.Prior({name: dist.Uniform(0, 1) for name in "ab"})
     observed = np.array([0.47, 0.5])
     for options in ({"noise": 0.1}, {"surrogate": "discrepancy"}):
-        fit = inference.fit(
-            simulate,
-            prior,
-            observed,
-            budget=40,
-            vectorised=False,
-            progress=False,
-            warn=False,
-            **options,
-        )
+        how = {"budget": 24, "confirm": 0, "vectorised": False, "progress": False, "warn": False}
+        fit = inference.fit(simulate, prior, observed, **how, **options)
         drawn = fit.sample("quadrature", warn=False)["posterior"]
         # 0.18 of the mass would lie there if runs did not fail
         assert (drawn["a"] + drawn["b"] > 1.1).mean() < 0.05

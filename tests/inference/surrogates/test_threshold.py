@@ -10,10 +10,10 @@ from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
 from bolfi_liquids.inference.surrogates.threshold import (
     Matched,
     Predicted,
+    Transform,
     log_both_below,
     matched,
 )
-from bolfi_liquids.inference.surrogates.transform import Transform
 from scipy.special import erfcx
 from scipy.stats import norm
 
@@ -21,14 +21,6 @@ from bolfi_liquids import inference
 
 U = sobol(0, 0, 12, 2)
 DELTA = 1.0 + ((U - 0.4) ** 2).sum(-1)
-
-
-def test_agrees_with_scipy_with_the_noise_in_sigma():
-    fitted = with_threshold(learn(U, DELTA, "identity"), Predicted(0.2))
-    u = np.array([[0.8, 0.3]])
-    mean, sd = fitted.predict(u)
-    value = fitted.log_likelihood(u)
-    np.testing.assert_allclose(value, norm.logcdf((fitted.threshold - mean[0]) / sd[0]), rtol=1e-6)
 
 
 def test_finite_and_monotone_with_finite_gradients_over_a_hundred_decades():
@@ -59,10 +51,10 @@ def test_log_ndtr_by_jax_is_that_of_scipy_and_its_slope_the_mills_ratio():
     np.testing.assert_allclose(slopes, expected, rtol=1e-8)
 
 
-@pytest.mark.parametrize("r", [1e-6, 0.01, 0.5, 0.9, 0.999])
+@pytest.mark.parametrize("r", [1e-6, 0.5, 0.999])
 def test_the_chance_that_both_pass_is_right_in_the_tail_too(r):
     """Against a dense sum over what the two have in common, about the integrand's peak."""
-    for z in (2.0, -1.0, -3.999, -4.001, -8.0, -20.0, -30.0):
+    for z in (2.0, -1.0, -4.0, -8.0, -30.0):
         peak = 2.0 * np.sqrt(r) / (1.0 + r) * max(-z, 0.0)
         w = np.linspace(peak - 12.0, peak + 12.0, 400_001)
         logs = 2.0 * norm.logcdf((z + np.sqrt(r) * w) / np.sqrt(1.0 - r)) + norm.logpdf(w)
@@ -71,31 +63,39 @@ def test_the_chance_that_both_pass_is_right_in_the_tail_too(r):
         assert found == pytest.approx(expected, abs=0.01)
 
 
+def test_threshold_rules():
+    for rule, expected in {
+        "min_observed": np.sqrt(DELTA.min()),
+        inference.surrogates.Quantile(0.25): np.sqrt(np.quantile(DELTA, 0.25)),
+        1.44: 1.2,
+    }.items():
+        found = with_threshold(learn(U, DELTA, "sqrt"), rule).threshold
+        np.testing.assert_allclose(found, expected)
+
+
 @pytest.mark.parametrize(
-    ("rule", "expected"),
+    ("option", "value"),
     [
-        ("min_observed", np.sqrt(DELTA.min())),
-        (inference.surrogates.Quantile(0.25), np.sqrt(np.quantile(DELTA, 0.25))),
-        (1.44, 1.2),
+        ("threshold", "nonsense"),
+        ("threshold", inference.surrogates.Quantile(1.5)),
+        ("threshold", Predicted(0.0)),
+        ("threshold", Matched(0.0)),
+        ("threshold", np.nan),
+        ("transform", "cube"),
+        ("discrepancy", 3.0),
     ],
 )
-def test_threshold_rules(rule, expected):
-    np.testing.assert_allclose(with_threshold(learn(U, DELTA, "sqrt"), rule).threshold, expected)
-
-
-@pytest.mark.parametrize("rule", ["nonsense", inference.surrogates.Quantile(1.5), np.nan])
-def test_bad_rules_are_refused(prior, observed, rule):
-    with pytest.raises(ValueError, match="threshold must be one of"):
-        inference.Bolfi(prior, observed, threshold=rule)
+def test_bad_options_are_refused(option, value):
+    with pytest.raises(ValueError, match=f"{option} must be"):
+        inference.DiscrepancyFamily(**{option: value})
 
 
 def test_a_threshold_that_the_transform_cannot_take_is_refused():
-    with pytest.raises(ValueError, match="must be positive for the transform 'log'"):
+    with pytest.raises(ValueError, match="threshold .* must be positive"):
         with_threshold(learn(U, DELTA, "log"), -1.0)
 
 
-@pytest.mark.parametrize("name", ["identity", "sqrt", "log"])
-@pytest.mark.parametrize("dimension", [1, 2, 4])
+@pytest.mark.parametrize(("name", "dimension"), [("identity", 1), ("sqrt", 2), ("log", 4)])
 def test_a_matched_threshold_gives_the_width_of_independent_errors(name, dimension):
     """Draws along the radius of a quadratic discrepancy, weighted by Phi: d s^2 is expected."""
     numbers, least, transform = 30, 6.0, Transform(name, 0.0)

@@ -1,14 +1,14 @@
-"""Measurement noise that the user knows, over the values of an output."""
+"""Measurement noise that users give: its sd, its sds or its covariance."""
 
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._float64 import in_float64
-from ..arguments import checked_array
-from .measurement_noise import Layout
-from .output_vectors import Output
+from ..._float64 import in_float64
+from ...arguments import checked_array
+from ..measurement_noise import Layout
+from ..output_vectors import Output
 
 
 @runtime_checkable
@@ -30,11 +30,11 @@ class GivenNoise(NamedTuple):
 
     @property
     def covariance(self) -> np.ndarray:
-        """[m, m]"""
+        """Covariance of the values [m, m]."""
         return np.diag(self.white) + self.factors @ self.factors.T
 
     def draw(self, rng: np.random.Generator, n: int) -> np.ndarray:
-        """[n, m]"""
+        """n draws of the noise [n, m]."""
         m, q = self.factors.shape
         return (
             rng.normal(size=(n, m)) * np.sqrt(self.white) + rng.normal(size=(n, q)) @ self.factors.T
@@ -75,23 +75,20 @@ def given_sds(noise: ArrayLike, output: Output) -> np.ndarray | None:
         ValueError: noise is none of these.
     """
     samples, given = len(output.present), checked_array("noise", noise)
-    if given.shape == (samples, samples) == output.shape:
-        raise ValueError(
-            f"noise of shape {given.shape} may be sds or a covariance; give sds as [{samples}]"
-        )
-    if given.shape == (samples, samples):
-        return None
+    square = samples, samples
     if given.ndim < 2 and given.size == 1:
         sds = given.reshape(())
-    elif given.shape == output.shape:
+    elif given.shape == square != output.shape:
+        return None
+    elif given.shape == output.shape != square:
         sds = given.ravel()[np.sort(output.present)]
     elif given.shape == (samples,):
         sds = given
     else:
         raise ValueError(
             f"noise must be a number, sds of shape {output.shape} as observed or [{samples}], or a "
-            f"[{samples}, {samples}] covariance, of the finite observed values, "
-            f"got shape {given.shape}"
+            f"[{samples}, {samples}] covariance, of the finite observed values, and not two of "
+            f"these, got shape {given.shape}"
         )
     wrong = sds[~(np.isfinite(sds) & (sds >= 0.0))]
     if wrong.size:
