@@ -95,7 +95,7 @@ def test_noise_believed_too_small_refuses_the_right_explanation():
 def usual_of(freedom):
     """A simulator that is usually wrong by .2, as said by so many clean sets."""
     autocovariance = 0.2**2 * np.exp(-np.arange(N) / 10.0)
-    return criticism.UsualResidual(autocovariance, freedom)
+    return criticism.ModelError(autocovariance, freedom)
 
 
 def test_what_is_usual_for_a_simulator_does_not_make_it_deaf():

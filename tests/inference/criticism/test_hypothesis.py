@@ -4,11 +4,14 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference import criticism
-from bolfi_liquids.inference.criticism.hypothesis import hypothesise, values_of
+from bolfi_liquids.inference.criticism.hypothesis import (
+    hypothesise,
+    values_of,
+    weighted_posterior,
+)
 from bolfi_liquids.inference.criticism.measurement_noise import samples
 from bolfi_liquids.inference.criticism.misfit import locate, null_draws
-from bolfi_liquids.inference.criticism.posterior import weighted_posterior
-from bolfi_liquids.inference.criticism.prior_boxes import everywhere, fill
+from bolfi_liquids.inference.criticism.runs import PriorBox
 from bolfi_liquids.inference.criticism.study import Study
 from bolfi_liquids.inference.simulations import Compute
 from bolfi_liquids.inference.surrogates import output_vectors
@@ -35,8 +38,8 @@ def oscillate(theta, seeds):
 def fitted(simulate, observed, noise, bank, count=RUNS):
     experiment = criticism.Experiment(simulate, observed, noise)
     study = Study(experiment, PRIOR, EXTENSIONS, Compute(batch=64), seed=bank)
-    runs = study.run("start", fill(everywhere(1), PRIOR, bank, count))
-    return hypothesise((), PRIOR, runs, observed, noise, everywhere(1))
+    runs = study.run("start", PriorBox.whole(1).fill(PRIOR, bank, count))
+    return hypothesise((), PRIOR, runs, observed, noise, PriorBox.whole(1))
 
 
 @pytest.fixture(scope="module")
@@ -166,14 +169,14 @@ def test_a_posterior_allows_for_what_is_not_known_of_the_usual_residuals_size(si
     t, and as wide as the residuals that are seen."""
     rng, n, sd, freedom = np.random.default_rng(0), 30, 0.05, 3
     prior = inference.Prior({"level": dist.Uniform(-2.0, 2.0)})
-    usual = criticism.UsualResidual(np.append(sd**2, np.zeros(n - 1)), freedom)
+    usual = criticism.ModelError(np.append(sd**2, np.zeros(n - 1)), freedom)
     noise = criticism.SumOfNoises((criticism.KnownNoise(1e-4), usual))
     observed = 0.3 + size * sd * rng.normal(size=n)
     experiment = criticism.Experiment(level, observed, noise)
     runs = Study(experiment, prior, EXTENSIONS, Compute(batch=64)).run(
-        "start", fill(everywhere(1), prior, 0, 12)
+        "start", PriorBox.whole(1).fill(prior, 0, 12)
     )
-    found = weighted_posterior(hypothesise((), prior, runs, observed, noise, everywhere(1)))
+    found = weighted_posterior(hypothesise((), prior, runs, observed, noise, PriorBox.whole(1)))
     draws, weights = found.theta["level"], found.weights
     spread = np.sqrt(np.average((draws - np.average(draws, weights=weights)) ** 2, weights=weights))
     squares = freedom * sd**2 + np.sum((observed - observed.mean()) ** 2)

@@ -8,11 +8,10 @@ import pytest
 from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference._float64 import in_float64
 from bolfi_liquids.inference.criticism.measurement_noise import gaussian, samples
-from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws
+from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws, scored_on_clean
+from bolfi_liquids.inference.criticism.model_errors import REPEATED
 from bolfi_liquids.inference.criticism.search import examine
-from bolfi_liquids.inference.criticism.signatures import scored_on_clean
 from bolfi_liquids.inference.criticism.study import Study
-from bolfi_liquids.inference.criticism.usual_residual import REPEATED
 from bolfi_liquids.inference.simulations import Compute
 from bolfi_liquids.inference.surrogates.emulator import latent_covariance
 from scipy.stats import binom, kstest, norm
@@ -43,6 +42,13 @@ WINDOWS = [
 ]
 
 
+def learned(residuals, noises, same, distances=None):
+    """The model error that these clean data teach."""
+    far = np.zeros(len(residuals)) if distances is None else distances
+    given = zip(residuals, noises, same, far, strict=True)
+    return criticism.learned_model_error([criticism.CleanData(*one) for one in given])
+
+
 def exact(theta, seeds):
     bump = theta.get("bump", np.zeros(len(seeds)))
     return np.stack([theta["level"], theta["wave"]], 1) @ DESIGN.T + bump[:, None] * BUMP
@@ -63,7 +69,7 @@ def observe(simulate, number, bump=0.0):
 
 def examined(simulate, observed, bank):
     experiment = criticism.Experiment(simulate, observed, NOISE)
-    return examine(Study(experiment, PRIOR, EXTENSIONS, Compute(batch=64), seed=bank), None)[0]
+    return examine(Study(experiment, PRIOR, EXTENSIONS, Compute(batch=64), seed=bank), None)
 
 
 def on(hypothesis, observed):
@@ -209,7 +215,7 @@ def repeating(banks):
             rng = np.random.default_rng([bank, number])
             *errors, own = 0.6 * gaussian(rng, alike, 1)[0]
             clean = [(error * BUMP)[:, None] for error in errors]
-            usual = criticism.usual_residual(clean, [silent] * 3, [True] * 3)
+            usual = learned(clean, [silent] * 3, [True] * 3)
             noise = criticism.SumOfNoises((NOISE, usual))
             data = observe(noisy, 1000 * (bank + 1) + number) + own * BUMP - usual.mean(AT)
             model = replace(on(base.hypothesis, data), noise=noise.covariance(AT))
@@ -237,7 +243,7 @@ def test_clean_data_are_scored_by_what_the_others_teach(banks):
     scores = []
     for k in range(2):
         left, again = np.delete(clean, k, axis=0), np.delete(repeats, k)
-        taught = criticism.usual_residual(list(left), [silent] * 2, list(again))
+        taught = learned(list(left), [silent] * 2, list(again))
         unexpected = shapes[k] - taught.mean(AT)
         weight = np.linalg.inv(
             base.hypothesis.spread + NOISE.covariance(AT) + taught.covariance(AT)
@@ -248,7 +254,7 @@ def test_clean_data_are_scored_by_what_the_others_teach(banks):
         scores.append(change @ weight @ unexpected / np.sqrt(change @ weight @ change))
     size = np.sqrt((1.0 + np.sum(np.square(scores))) / 3.0)
     assert size > 1.5
-    usual = criticism.usual_residual(clean, [silent] * 3, repeats)
+    usual = learned(clean, [silent] * 3, repeats)
     noise = criticism.SumOfNoises((NOISE, usual))
     believed = replace(base.hypothesis, noise=noise.covariance(AT))
     found = scored_on_clean(believed, noise, base.signatures)
@@ -257,7 +263,7 @@ def test_clean_data_are_scored_by_what_the_others_teach(banks):
 
 def test_a_clean_set_alone_says_nothing_of_scores(banks):
     base = banks[0]
-    usual = criticism.usual_residual([BUMP[:, None]], [criticism.KnownNoise(0.0)], [True])
+    usual = learned([BUMP[:, None]], [criticism.KnownNoise(0.0)], [True])
     for noise in (NOISE, criticism.SumOfNoises((NOISE, usual))):
         assert scored_on_clean(base.hypothesis, noise, base.signatures)["bump"].clean == 1.0
 
@@ -280,7 +286,7 @@ def test_a_prior_says_on_which_side_an_effect_can_act(low, high, side):
     observed = observe(exact, 3)
     experiment = criticism.Experiment(exact, observed, NOISE)
     study = Study(experiment, PRIOR, extensions, Compute(batch=64))
-    found = examine(study, None)[0].signatures
+    found = examine(study, None).signatures
     assert found["bump"].side == side
     assert found["bump"].change @ BUMP > 0.0  # towards a greater coefficient, on either side
 

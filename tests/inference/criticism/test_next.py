@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bolfi_liquids.inference import criticism
-from bolfi_liquids.inference.criticism.next_experiment import RUNS_EACH, _distance
+from bolfi_liquids.inference.criticism.held_out import RUNS_EACH, separation
 
 SAMPLES, NOISE, REPEATS = 120, 0.1, 200
 WAVE = np.sqrt(2.0 / SAMPLES) * np.cos(np.pi * 6 * (np.arange(SAMPLES) + 0.5) / SAMPLES)
@@ -19,7 +19,7 @@ def found(ratio, own):
         rng = np.random.default_rng(seed)
         runs = own * NOISE * rng.normal(size=(2, RUNS_EACH, SAMPLES))
         runs[1] += ratio * NOISE * WAVE
-        return _distance(proposal, list(runs), 0, 1)
+        return separation(proposal, {"one": runs[0], "other": runs[1]}).snr
 
     return np.array([repeat(seed) for seed in range(REPEATS)])
 

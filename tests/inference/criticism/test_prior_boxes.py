@@ -4,8 +4,8 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference import criticism
-from bolfi_liquids.inference.criticism.posterior import weighted_posterior
-from bolfi_liquids.inference.criticism.prior_boxes import PriorBox, fill, hull, intersection, sides
+from bolfi_liquids.inference.criticism.hypothesis import weighted_posterior
+from bolfi_liquids.inference.criticism.runs import PriorBox, sides
 from bolfi_liquids.inference.criticism.search import examine, explain
 from bolfi_liquids.inference.criticism.study import Study
 from bolfi_liquids.inference.simulations import Compute
@@ -44,8 +44,8 @@ def test_a_point_at_a_wall_is_not_enclosed_unless_the_prior_ends_there():
 
 def test_a_hull_holds_both_boxes_and_an_intersection_is_in_both():
     one, other = PriorBox(np.zeros(2), np.full(2, 0.5)), PriorBox(np.array([0.2, 0.4]), np.ones(2))
-    np.testing.assert_array_equal(hull(one, other), [[0.0, 0.0], [1.0, 1.0]])
-    np.testing.assert_array_equal(intersection(one, other), [[0.2, 0.4], [0.5, 0.5]])
+    np.testing.assert_array_equal(one.hull(other), [[0.0, 0.0], [1.0, 1.0]])
+    np.testing.assert_array_equal(one.intersection(other), [[0.2, 0.4], [0.5, 0.5]])
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def test_best_fit_and_posterior_stay_where_the_model_was_simulated():
     """Data that lie beyond draw both to the end and no further."""
     within = PriorBox(np.array([0.2]), np.array([0.5]))
     study = study_of(observed(1.5))
-    runs = study.run("start", fill(within, PRIOR, 0, 12))
+    runs = study.run("start", within.fill(PRIOR, 0, 12))
     found = study.hypothesis((), runs, within)
     assert found.u[0] == pytest.approx(0.5, abs=0.01)
     level = weighted_posterior(found).draw(0, 200)["level"]
@@ -78,7 +78,7 @@ def test_best_fit_and_posterior_stay_where_the_model_was_simulated():
 def test_a_truth_outside_of_the_box_of_the_model_without_the_effect_is_reached():
     """The base model fits best at 1.6, half of the prior's range away."""
     study = study_of(observed(0.0, 1.4))
-    base, _ = examine(study, None)
+    base = examine(study, None)
     assert not base.box.encloses(np.array([0.5]))
     _, accepted = explain(study, base)
     (one,) = accepted
