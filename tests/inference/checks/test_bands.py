@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from bolfi_liquids.inference.checks import bands
+from bolfi_liquids.inference.checks import ranks as bands
 from scipy.stats import binom
 
 ALPHA = 1e-4  # false alarms per test

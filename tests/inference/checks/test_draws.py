@@ -4,7 +4,8 @@ import arviz_base
 import numpy as np
 import pandas as pd
 import pytest
-from bolfi_liquids.inference.checks import draws, ranks
+from bolfi_liquids.inference.checks import one_replicate as draws
+from bolfi_liquids.inference.checks import ranks
 from scipy.stats import chisquare
 
 ALPHA = 1e-4  # false alarms per test
