@@ -150,12 +150,12 @@ class Extension:
 
     def __post_init__(self) -> None:
         support = Prior({"coefficient": self.prior})
-        checked_number(
-            "an extension's neutral",
-            self.neutral,
-            lambda at: math.isfinite(at) and support.contains({"coefficient": np.asarray(at)}),
-            "finite and in the prior's support",
-        )
+
+        def possible(at: float) -> bool:
+            return math.isfinite(at) and bool(support.contains({"coefficient": np.asarray(at)}))
+
+        due = "finite and in the prior's support"
+        checked_number("an extension's neutral", self.neutral, possible, due)
         check_text("unit", self.unit)
         check_text("text", self.text)
 

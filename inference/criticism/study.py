@@ -145,13 +145,13 @@ class Study:
                 for k, (job, one) in enumerate(zip(batch, own, strict=True))
                 if k not in good
             ]
-            error = errors and (
-                f"{len(errors)} of {len(batch)} simulations of the phase {phase!r} failed, the "
-                f"first {errors[0]}"
-            )
+            error = ""
+            if errors:
+                failed = f"{len(errors)} of {len(batch)} simulations of the phase {phase!r} failed"
+                error = f"{failed}, the first {errors[0]}"
             at = {name: np.asarray(column, float)[rows] for name, column in theta.items()}
             signals = np.reshape(list(good.values()), (len(rows), *made_for.shape))
-            runs.append(self.table(at, signals, seeds[rows], error or ""))
+            runs.append(self.table(at, signals, seeds[rows], error))
         return runs
 
     def table(
