@@ -1,8 +1,10 @@
-"""The noises that criticism reckons with: learned from rest and clean data, drawn as believed."""
+"""Noise and model error: learned from rest and clean data, drawn as believed, given to a fit."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
+import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.measurement_noise import CORRELATIONS, gaussian
@@ -10,7 +12,9 @@ from bolfi_liquids.inference.criticism.model_errors import REPEATED
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
-from scipy.stats import chi2, chisquare, norm
+from scipy.stats import binom, chi2, chisquare, norm
+
+from bolfi_liquids import inference
 
 ALPHA = 1e-4  # false alarms per test
 DRAWS, RUNS, BINS = 63, 128, 8  # of the rank test; the bins divide DRAWS + 1
@@ -29,13 +33,6 @@ def autoregressive(rng, shape, sd, correlation):
     white = rng.normal(size=shape)
     white[1:] *= np.sqrt(1.0 - correlation**2)
     return sd * lfilter([1.0], [1.0, -correlation], white, axis=0)
-
-
-@pytest.fixture
-def gappy():
-    """Two channels, sample after sample, some missing: as a flattened output with NaN."""
-    at = np.delete(np.arange(20), [3, 4, 6, 11])
-    return Layout(at % 2, at // 2)
 
 
 # Learned from rest.
@@ -89,38 +86,6 @@ def test_a_trend_that_is_not_taken_out_is_taken_for_correlated_noise():
     assert criticism.rest_noise([rest], trend=0).correlation.mean() > 0.8
 
 
-@pytest.mark.parametrize(("samples", "channels", "trend"), [(8, 1, 0), (4, 2, 0), (9, 1, 1)])
-def test_stretches_too_short_to_learn_from_are_refused(samples, channels, trend):
-    rest = np.random.default_rng(0).normal(size=(samples, channels))
-    with pytest.raises(ValueError, match="of 8 needed; give longer ones"):
-        criticism.rest_noise([rest], trend=trend)
-    more = np.random.default_rng(0).normal(size=(samples + 1, channels))
-    assert criticism.rest_noise([more], trend=trend).samples == more.size
-
-
-REST = np.random.default_rng(0).normal(size=(40, 2))
-
-
-@pytest.mark.parametrize("trend", [0, 1])
-@pytest.mark.parametrize("still", [0.0, 0.3, -7e5])
-def test_a_channel_that_stands_still_measures_no_noise(still, trend):
-    """Nor is it taken for a measurement beside one that varies."""
-    constant = np.full((40, 2), still)
-    beside = np.column_stack([REST[:, 0], constant[:, 1]])
-    for rest, channel in ((constant, 0), (beside, 1)):
-        with pytest.raises(ValueError, match=f"rests do not vary in channel {channel}"):
-            criticism.rest_noise([rest, rest[:9]], trend=trend)
-    varying = criticism.rest_noise([still + 1e-6 * REST], trend=trend)
-    assert abs(varying.sd.mean() / 1e-6 - 1.0) < 0.3
-
-
-def test_stretches_of_another_form_are_refused():
-    with pytest.raises(ValueError, match=r"\(40,\)"):
-        criticism.rest_noise([REST[:, 0]])
-    with pytest.raises(ValueError, match="rests .* 1 missing"):
-        criticism.rest_noise([np.where(np.arange(80).reshape(40, 2) == 5, np.nan, REST)])
-
-
 # Drawn as believed.
 
 
@@ -141,25 +106,28 @@ NOISES = {
     "autoregressive": (AR, 1.0),
     "sum": (criticism.SumOfNoises((AR, SIZES)), 1.0),
     # of a size that is known as well as a variance from FREEDOM numbers: Student's t
-    "usual residual": (USUAL, FREEDOM / (FREEDOM - 2.0)),
+    "model error": (USUAL, FREEDOM / (FREEDOM - 2.0)),
 }
 
 
-@pytest.mark.parametrize("kind", NOISES)
-def test_draws_have_the_covariance(gappy, kind):
-    noise, wider = NOISES[kind]
-    drawn = noise.draw(np.random.default_rng(0), gappy, 20_000)
-    covariance = wider * noise.covariance(gappy)
-    limit = norm.isf(ALPHA / 2 / covariance.size)
-    assert deviation(drawn, covariance) < limit
-    assert deviation(1.05 * drawn, covariance) > limit
-
-
-def test_white_draws_are_not_taken_for_correlated_ones(gappy):
+def test_draws_have_the_covariance_that_is_believed():
+    """Also beside gaps and in two channels; white draws of the same variances are found out."""
+    at = np.delete(np.arange(20), [3, 4, 6, 11])
+    gappy = Layout(at % 2, at // 2)  # sample after sample, some missing: a flattened output
+    limit = norm.isf(ALPHA / 2 / 16**2)
+    found = {}
+    for kind, (noise, wider) in NOISES.items():
+        drawn, covariance = (
+            noise.draw(np.random.default_rng(0), gappy, 20_000),
+            noise.covariance(gappy),
+        )
+        found[kind] = deviation(drawn, wider * covariance)
+        assert deviation(1.05 * drawn, wider * covariance) > limit
+    assert max(found.values()) < limit, found
     covariance = AR.covariance(gappy)
     white = criticism.KnownNoise(np.sqrt(np.diag(covariance)))
     drawn = white.draw(np.random.default_rng(0), gappy, 20_000)
-    assert deviation(drawn, covariance) > 2.0 * norm.isf(ALPHA / 2 / covariance.size)
+    assert deviation(drawn, covariance) > 2.0 * limit
 
 
 # Learned from clean data.
@@ -221,10 +189,10 @@ def test_residuals_of_the_same_experiment_say_where_it_errs_again(clean):
     assert (found.freedom, other.freedom) == (3, 3)
 
 
-@pytest.mark.parametrize("away", [[0.0, 0.0], [0.5, -1.0]], ids=["one regime", "three regimes"])
-def test_what_is_expected_of_a_simulator_is_right_as_often_as_it_says(away):
-    """Drawn together from the model: misses, whitened as is said, are chi-square."""
+def test_what_is_expected_of_a_simulator_is_right_as_often_as_it_says():
+    """Drawn together from the model in three regimes: whitened misses are chi-square."""
     at, drawn = Layout(np.repeat([0, 1], 30), np.tile(np.arange(30), 2)), 200
+    away = [0.5, -1.0]
     places = np.array([0.0, *away])
     over = np.exp(-0.5 * np.subtract.outer(places, places) ** 2)
     over = REPEATED * over + (1.0 - REPEATED) * np.eye(3)
@@ -260,17 +228,16 @@ def test_what_is_learned_in_another_regime_counts_little(clean):
     assert beside.freedom == pytest.approx(2.0, abs=1e-3)
 
 
-@pytest.mark.parametrize("longest", [12, 40, 70], ids=["shorter", "as long", "longer"])
-def test_the_covariance_is_positive_semidefinite(longest):
+def test_the_covariance_is_positive_semidefinite():
     """Also where the noise exceeds the residuals, they alternate, or the data are longer."""
     rng = np.random.default_rng(0)
-    at = Layout(np.zeros(longest, int), np.arange(longest))
     waves = np.cos(np.pi * np.arange(40))[:, None] * [1.0, -1.0]
     lengths = [rng.normal(size=(samples, 2)) for samples in (20, 40)]
-    for residuals in ([waves], lengths, [waves, *lengths], [np.cumsum(waves, 0) + 3.0]):
-        for noise in (0.0, 0.5, 2.0):
+    for residuals in ([waves], [waves, *lengths], [np.cumsum(waves, 0) + 3.0]):
+        for noise, longest in itertools.product((0.0, 2.0), (12, 70)):
             noises = [criticism.KnownNoise(noise)] * len(residuals)
             found = learned(residuals, noises, [False] * len(residuals))
+            at = Layout(np.zeros(longest, int), np.arange(longest))
             values = np.linalg.eigvalsh(found.covariance(at))
             assert values[0] > -1e-9 * max(values[-1], 1e-12)
 
@@ -284,11 +251,9 @@ def test_what_the_others_teach_is_learned_in_the_regime_of_the_one_left_out(clea
     np.testing.assert_allclose(sizes, [1.0, 1.0, 10.0, 10.0], rtol=0.2)
     weights = [weight for _, weight, _ in found.leave_one_out()]
     assert weights[0] == 1.0 and weights[1] > 0.99 and max(weights[2:]) < 1e-3
-
-
-def test_one_whose_regime_the_others_do_not_tell_of_is_not_judged(clean):
-    found = learned(clean[:3], [NOTHING] * 3, [True] * 3, [0.0, 0.3, 6.0])
-    assert [one.regime_distance for one, *_ in found.leave_one_out()] == [0.0, 0.3]
+    # one whose regime the others do not tell of is not judged
+    alone = learned(clean[:3], [NOTHING] * 3, [True] * 3, [0.0, 0.3, 6.0])
+    assert [one.regime_distance for one, *_ in alone.leave_one_out()] == [0.0, 0.3]
 
 
 def test_a_simulator_that_leaves_nothing_leaves_nothing(clean):
@@ -297,27 +262,54 @@ def test_a_simulator_that_leaves_nothing_leaves_nothing(clean):
     assert not found.mean(at).any() and not found.covariance(at).any()
 
 
-@pytest.mark.parametrize(
-    ("field", "wrong"),
-    [
-        ("residual", np.full((9, 1), np.nan)),
-        ("residual", np.where(np.arange(9)[:, None] == 3, np.inf, 1.0)),
-        ("residual", np.ones(9)),
-        ("residual", "abc"),
-        ("noise", 0.05),
-        ("same", 3),
-        ("regime_distance", np.nan),
-    ],
-)
-def test_data_that_teach_nothing_are_refused(field, wrong):
-    with pytest.raises(ValueError, match=rf"\b{field}\b"):
-        criticism.CleanData(**{"residual": np.ones((9, 1)), "noise": NOTHING, field: wrong})
+# Given.
+
+SAMPLES, TIME, SIZE, SD, TRUTH = 100, 8.0, 0.5, 0.1, 2.0
+SHAPE = np.sin(2.0 * np.pi * np.arange(SAMPLES) / 30.0)
+DATA = 40
+ERRORS = SIZE**2 * np.exp(-np.abs(np.subtract.outer(np.arange(SAMPLES), np.arange(SAMPLES))) / TIME)
 
 
-@pytest.mark.parametrize("shapes", [[], [(9, 1), (9, 2)], [(9, 1), (8, 1)]])
-def test_clean_data_that_do_not_go_together_are_refused(shapes):
-    with pytest.raises(ValueError, match="clean"):
-        criticism.learned_model_error([criticism.CleanData(np.ones(of), NOTHING) for of in shapes])
-    if shapes:
-        apart = [criticism.CleanData(np.ones((length, 1)), NOTHING, False) for length, _ in shapes]
-        assert criticism.learned_model_error(apart).freedom == len(shapes)
+def intervals(noise):
+    """90 % intervals [DATA, 2] of the amplitude that makes SHAPE, from 12 runs spread evenly."""
+    rng = np.random.default_rng(7)
+    prior = inference.Prior({"a": dist.Uniform(0.0, 4.0)})
+    errors = rng.multivariate_normal(np.zeros(SAMPLES), ERRORS, size=DATA)
+    runs = prior.from_unit((np.arange(12.0)[:, None] + 0.5) / 12.0)
+    signals = runs["a"][:, None] * SHAPE + 0.02 * rng.normal(size=(12, SAMPLES))
+    at = prior.from_unit((np.arange(2000)[:, None] + 0.5) / 2000.0)
+    found = []
+    for error in errors:
+        observed = TRUTH * SHAPE + error + SD * rng.normal(size=SAMPLES)
+        engine = inference.Bolfi(prior, observed, noise=noise, misfit=0.0)
+        engine.tell(runs, signals)
+        log_density = engine.fit(warn=False).log_prob(at)
+        mass = np.cumsum(np.exp(log_density - log_density.max()))
+        found.append(np.interp([0.05, 0.95], mass / mass[-1], at["a"]))
+    return np.array(found)
+
+
+@pytest.mark.slow
+def test_intervals_hold_beside_the_error_and_only_then():
+    """The exact posterior has an sd of 0.144; coverage of 0.6 would pass once in 1e3."""
+    known = criticism.KnownNoise(SD)
+    beside = criticism.SumOfNoises((known, criticism.model_error(SIZE, TIME)))
+    found, ignoring = intervals(beside), intervals(known)
+    held = [np.sum((low <= TRUTH) & (high >= TRUTH)) for low, high in (found.T, ignoring.T)]
+    assert held[0] >= binom.ppf(1e-3, DATA, 0.9) > held[1]
+    exact = 1.0 / np.sqrt(SHAPE @ np.linalg.solve(ERRORS + SD**2 * np.eye(SAMPLES), SHAPE))
+    assert np.ptp(found, 1).mean() == pytest.approx(3.29 * exact, rel=0.1)
+
+
+def test_a_process_has_the_size_and_correlation_that_were_given():
+    at = Layout(np.repeat([0, 1], SAMPLES), np.tile(np.arange(SAMPLES), 2))
+    found = criticism.model_error(SIZE, TIME).covariance(at)
+    np.testing.assert_allclose(found[:SAMPLES, :SAMPLES], ERRORS, atol=1e-4)
+    assert not found[:SAMPLES, SAMPLES:].any()
+
+
+def test_the_rhythm_of_a_sine_is_its_cosine():
+    found = criticism.rhythm(np.column_stack([SHAPE, 5.0 + SHAPE]))
+    expected = np.cos(2.0 * np.pi * np.arange(60) / 30.0) * (1.0 - np.arange(60) / SAMPLES)
+    np.testing.assert_allclose(found[:60], expected, atol=0.1)
+    assert criticism.rhythm(np.ones((5, 2))).tolist() == [1.0]
