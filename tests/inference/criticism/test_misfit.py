@@ -7,14 +7,11 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference import criticism
-from bolfi_liquids.inference._float64 import in_float64
-from bolfi_liquids.inference.criticism.measurement_noise import gaussian, samples
+from bolfi_liquids.inference.criticism.measurement_noise import samples
 from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws, scored_on_clean
-from bolfi_liquids.inference.criticism.model_errors import REPEATED
 from bolfi_liquids.inference.criticism.search import examine
 from bolfi_liquids.inference.criticism.study import Study
 from bolfi_liquids.inference.simulations import Compute
-from bolfi_liquids.inference.surrogates.emulator import latent_covariance
 from scipy.stats import binom, kstest, norm
 
 from bolfi_liquids import inference
@@ -23,7 +20,6 @@ pytestmark = pytest.mark.slow
 
 ALPHA = 1e-4  # false alarms per test
 BANKS, SETS = 5, 30  # emulators, and data sets for each
-REPEATING = 40  # data sets for each, whose errors repeat
 LEVEL = 0.05
 
 N = 96  # values
@@ -163,22 +159,6 @@ def test_scores_are_those_of_generalised_least_squares():
         assert base.check.scores["bump"] == pytest.approx(expected, abs=0.02)
 
 
-def test_the_simulators_own_noise_is_known_to_be_smooth(banks):
-    """Its variance along the slowest cosines, from 40 runs, on average over the banks."""
-    modes = np.cos(np.pi * np.arange(1, 7) * (STEPS[:, None] + 0.5) / N)
-    truth = np.sum(modes * (OWN @ modes), 0)
-    ratios = np.array(
-        [np.sum(modes * (own_covariance(base.hypothesis) @ modes), 0) / truth for base in banks]
-    )
-    # 40 runs tell one variance to 22 %, the mean of 5 times 6 to 4 %
-    assert abs(ratios.mean() - 1.0) < 0.15, ratios.mean(0)
-
-
-@in_float64
-def own_covariance(hypothesis):
-    return hypothesis.spread - latent_covariance(hypothesis.surrogate.emulator, hypothesis.u)
-
-
 def located(banks, bump):
     """p-values [data sets, windows]."""
     p_values = []
@@ -200,36 +180,6 @@ def test_the_window_in_which_the_data_differ_is_found(banks):
     assert np.mean(p_values.argmin(1) == 3) > 0.9
     assert np.mean(p_values[:, 3] < LEVEL) > 0.9
     assert not too_many(p_values[:, [0, 1, 5]].min(1))
-
-
-@pytest.fixture(scope="module")
-def repeating(banks):
-    """Checks of right models whose errors, all along the effect's direction, repeat: scored with
-    three clean data sets, and without that."""
-    alike = np.full((4, 4), REPEATED) + (1.0 - REPEATED) * np.eye(4)
-    silent, scored, unscored = criticism.KnownNoise(0.0), [], []
-    for bank, base in enumerate(banks):
-        for number in range(REPEATING):
-            rng = np.random.default_rng([bank, number])
-            *errors, own = 0.6 * gaussian(rng, alike, 1)[0]
-            clean = [(error * BUMP)[:, None] for error in errors]
-            usual = learned(clean, [silent] * 3, [True] * 3)
-            noise = criticism.SumOfNoises((NOISE, usual))
-            data = observe(noisy, 1000 * (bank + 1) + number) + own * BUMP - usual.mean(AT)
-            model = replace(on(base.hypothesis, data), noise=noise.covariance(AT))
-            null = null_draws(model, noise, rng)
-            signatures = scored_on_clean(model, noise, base.signatures)
-            scored.append(check(model, signatures, null).p_score)
-            unscored.append(check(model, base.signatures, null).p_score)
-    return np.array(scored), np.array(unscored)
-
-
-def test_an_error_that_repeats_is_less_often_taken_for_the_effect_that_it_resembles(repeating):
-    """The usual residual is stationary and the error is not: alarms are up to twice as many as they
-    should be, and more without scores on clean data."""
-    scored, unscored = repeating
-    assert np.sum(scored < LEVEL) <= binom.isf(ALPHA, len(scored), 2.0 * LEVEL)
-    assert np.sum(unscored < LEVEL) > binom.isf(ALPHA, len(scored), 2.0 * LEVEL)
 
 
 def test_clean_data_are_scored_by_what_the_others_teach(banks):

@@ -1,12 +1,11 @@
 """The covariance of the simulator's own noise, from runs far fewer than values."""
 
-import functools
 import itertools
 
 import numpy as np
 from bolfi_liquids.inference.criticism.misfit import slow_modes
 from bolfi_liquids.inference.criticism.run_noise import errors_of, resized, smooth_covariance
-from bolfi_liquids.inference.surrogates.measurement_noise import Layout, shrunk_covariance
+from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 from scipy.stats import norm
 
 ALPHA = 1e-4  # false alarms per test
@@ -23,67 +22,23 @@ def smooth():
     return np.exp(-0.5 * (lag / 5.0) ** 2) * np.outer(size, size)
 
 
-PROCESSES = {"smooth": smooth(), "white": np.eye(SAMPLES)}
-
-
-def towards_white(errors):
-    """Ledoit and Wolf's."""
-    found = shrunk_covariance(errors, 0)
-    return found.factors @ found.factors.T + found.white * np.eye(SAMPLES)
-
-
-def towards_smooth(errors):
-    return smooth_covariance(errors, AT, True)
-
-
-@functools.cache
-def estimates(process, estimate):
-    """Relative Frobenius errors, and slow modes' variances over the true ones [REPEATS, SLOW]."""
-    truth = PROCESSES[process]
-    values, vectors = np.linalg.eigh(truth)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    expected = np.sum(MODES * (truth @ MODES), 0)
-    errors, ratios = [], []
-    for repeat in range(REPEATS):
-        white = np.random.default_rng(repeat).normal(size=(RUNS, SAMPLES))
-        found = estimate(white @ root.T)
-        errors.append(np.linalg.norm(found - truth) / np.linalg.norm(truth))
-        ratios.append(np.sum(MODES * (found @ MODES), 0) / expected)
-    return np.array(errors), np.array(ratios)
-
-
-def surely_biased(ratios):
-    """Modes whose mean is beyond BIAS by more than its Monte Carlo error."""
-    error = ratios.std(0, ddof=1) / np.sqrt(REPEATS)
-    return np.abs(ratios.mean(0) - 1.0) - norm.isf(ALPHA / SLOW) * error > BIAS
-
-
-def surely_unbiased(ratios):
-    error = ratios.std(0, ddof=1) / np.sqrt(REPEATS)
-    return np.abs(ratios.mean(0) - 1.0) + error < BIAS
-
-
 def test_the_slow_part_of_noise_is_as_large_as_it_is():
-    for process in PROCESSES:
-        found = estimates(process, towards_smooth)[1]
-        assert surely_unbiased(found).all(), (process, found.mean(0))
-
-
-def test_smooth_noise_is_found_better_than_by_shrinking_towards_white():
-    """Which makes its slow part too small."""
-    biased = estimates("smooth", towards_white)[1]
-    assert surely_biased(biased).any() and (biased.mean(0) < 1.0).all(), biased.mean(0)
-    ours, theirs = (estimates("smooth", how)[0] for how in (towards_smooth, towards_white))
-    assert (ours < theirs).all()
-    assert ours.mean() < 0.8 * theirs.mean()
-
-
-def test_white_noise_is_found_nearly_as_well_as_if_it_were_known_to_be_white():
-    """The sample covariance errs by sqrt(m / n) = 2.2; what is learned besides the one size are
-    the sizes, to 2 / sqrt(n * 15) each, and 199 correlations, to 1 / sqrt(n m) each."""
-    ours = estimates("white", towards_smooth)[0]
+    """Of smooth noise that white targets would make too small, and of white noise, which is found
+    nearly as well as if it were known to be white: sizes to 2 / sqrt(n * 15) each, 199 correlations
+    to 1 / sqrt(n m) each."""
+    for process, truth in {"smooth": smooth(), "white": np.eye(SAMPLES)}.items():
+        values, vectors = np.linalg.eigh(truth)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        errors, ratios = [], []
+        for repeat in range(REPEATS):
+            white = np.random.default_rng(repeat).normal(size=(RUNS, SAMPLES))
+            found = smooth_covariance(white @ root.T, AT, True)
+            errors.append(np.linalg.norm(found - truth) / np.linalg.norm(truth))
+            ratios.append(np.sum(MODES * (found @ MODES), 0) / np.sum(MODES * (truth @ MODES), 0))
+        error = np.std(ratios, 0, ddof=1) / np.sqrt(REPEATS)
+        assert (np.abs(np.mean(ratios, 0) - 1.0) + error < BIAS).all(), process
     allowed = np.sqrt(2.0 / (RUNS * 15) + SAMPLES / (RUNS * SAMPLES))
-    assert ours.mean() < 2.0 * allowed
+    assert np.mean(errors) < 2.0 * allowed
 
 
 def test_channels_of_unlike_size_and_of_samples_in_any_order_are_kept_apart():
