@@ -38,7 +38,7 @@ class Judged(ABC):
     @property
     @abstractmethod
     def faults(self) -> list[str]:
-        """What is wrong with the pipeline, beside its replicates."""
+        """Faults of the pipeline, beside those of its replicates."""
 
     @property
     def warnings(self) -> list[str]:

@@ -83,7 +83,7 @@ class Criticism(Displayed):
 
     @property
     def coefficients(self) -> dict[str, Interval]:
-        """Of the accepted effects."""
+        """Mean and 90 % interval of each accepted effect's coefficient."""
         return {name: self.posterior.interval(name) for name in self.accepted}
 
     @property

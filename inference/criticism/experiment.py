@@ -77,7 +77,7 @@ class Experiment:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the output."""
+        """Shape of the output."""
         return self.observed.shape
 
     @property

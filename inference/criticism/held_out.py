@@ -181,7 +181,7 @@ def separation(proposal: Proposal, signals: Mapping[str, np.ndarray]) -> Suggest
 def _judged(
     noise: Noise, observed: np.ndarray, groups: Sequence[np.ndarray], factor: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What predictions of n observed values are judged by.
+    """Prepare to judge predictions of n observed values.
 
     Args:
         groups: Runs [k, n] of each model.

@@ -108,7 +108,7 @@ class Hypothesis:
     @cached_property
     @in_float64
     def sd(self) -> np.ndarray:
-        """Of the parameters in prior quantiles, by Laplace's approximation [d]."""
+        """Sds of the parameters in prior quantiles, by Laplace's approximation [d]."""
         # a uniform quantile has the variance 1/12
         information = self.slopes.T @ self.slopes + 12.0 * np.eye(len(self.u))
         return np.sqrt(np.diag(np.linalg.inv(information)))
@@ -155,14 +155,14 @@ def hypothesise(
         within: Where the effects were simulated. Elsewhere the emulator only guesses, and of all
             guesses some are near to whatever was observed.
     """
-    told = runs.of(names)
+    used = runs.of(names)
     # every component: a small effect may show in one that few runs hardly predict
     covariance = noise.covariance(samples(observed))
     fixed = {"misfit": 0, "components": COMPONENTS, "predicted": None, "varying_noise": False}
     family = SignalFamily(noise=covariance, **fixed)
     engine = Bolfi(prior, observed, surrogate=family)
-    theta = {name: told.theta[name] for name in prior.names}
-    engine.tell(theta, told.signals, told.seeds)
+    theta = {name: used.theta[name] for name in prior.names}
+    engine.tell(theta, used.signals, used.seeds)
     fit = engine.fit(warn=False)  # that a model cannot reach the data is what is looked for
     surrogate = fit.learned
     assert isinstance(surrogate, SignalSurrogate) and surrogate.known is not None
@@ -198,7 +198,7 @@ def hypothesise(
 def _nearest(
     surrogate: SignalSurrogate, errors: np.ndarray, within: PriorBox
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where in a box the expected output is nearest to what was observed, prior quantiles [d], and
+    """Prior quantiles [d] in a box at which the expected output is nearest to what was observed, and
     the covariance [m, m] of the simulator's own noise, of which there are draws [n, m]."""
     assert surrogate.known is not None
     own = smooth_covariance(errors, surrogate.output.layout, surrogate.output.long)
@@ -259,7 +259,7 @@ def values_of(output: Output, drawn: np.ndarray) -> np.ndarray:
 
 
 class Interval(NamedTuple):
-    """Of one parameter."""
+    """Mean and 90 % interval of one parameter."""
 
     mean: float
     q05: float

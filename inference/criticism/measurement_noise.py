@@ -1,4 +1,4 @@
-"""What lies between a simulator's mean output and the data, besides the simulator's own noise."""
+"""Noise between a simulator's mean output and the data, besides the simulator's own noise."""
 
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable

@@ -1,4 +1,4 @@
-"""Whether a fitted model and the data disagree, where, and whether as an effect would."""
+"""Tests of a fitted model: do it and the data disagree, where, and as which effect would?"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -186,7 +186,7 @@ def exceedance(usual: np.ndarray, seen: np.ndarray | list[float]) -> np.ndarray:
 
 
 def _own_exceedance(usual: np.ndarray) -> np.ndarray:
-    """Of each draw among its own kind, [k, n]; ties count as in `exceedance`."""
+    """Exceedance of each draw among its own kind [k, n]; ties count as in `exceedance`."""
     count = usual.shape[1]
     smaller = [np.searchsorted(np.sort(row), row - 1e-12) for row in usual]
     return (count - np.stack(smaller)) / (count + 1.0)
@@ -194,7 +194,7 @@ def _own_exceedance(usual: np.ndarray) -> np.ndarray:
 
 @in_float64
 def signature(base: Hypothesis, extended: Hypothesis, extension: Extension) -> Signature:
-    """Of the effect by which `extended` goes beyond `base`.
+    """Signature of the effect by which `extended` goes beyond `base`.
 
     Secants rather than a slope: runs are noisy, so an effect is taken where one would see it.
     """

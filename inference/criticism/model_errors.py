@@ -68,7 +68,7 @@ class CleanData:
 
     @property
     def correlation(self) -> float:
-        """Of the simulator's error on it with that on the data that are looked at."""
+        """Correlation of the simulator's error on it with that on the data that are looked at."""
         return REPEATED * float(_likeness(self.regime_distance)) * self.same
 
     def values(self, at: Layout) -> np.ndarray:
@@ -102,7 +102,7 @@ class ModelError:
         return self._given(at)[0]
 
     def covariance(self, at: Layout) -> np.ndarray:
-        """Of the residual about that mean [n, n]."""
+        """Covariance of the residual about that mean [n, n]."""
         return self._given(at)[1]
 
     def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
@@ -192,7 +192,7 @@ def _likeness(regime_distance: np.ndarray | float) -> np.ndarray:
 
 
 def _correlation(one: CleanData, other: CleanData) -> float:
-    """Of the simulator's errors on two repetitions."""
+    """Correlation of the simulator's errors on two repetitions."""
     apart = one.regime_distance - other.regime_distance
     return 1.0 if one is other else REPEATED * float(_likeness(apart))
 

@@ -108,7 +108,7 @@ class Study:
         thetas: Sequence[Mapping[str, np.ndarray]],
         elsewhere: Experiment | Proposal | None = None,
     ) -> list[Runs]:
-        """The same at several theta in one call; the k-th run of each has the same seed.
+        """Simulate at several theta in one call; the k-th run of each has the same seed.
 
         So what they differ by is not chance. Where all runs at a theta fail, there are none of it.
 
