@@ -198,7 +198,7 @@ def hypothesise(
 def _nearest(
     surrogate: SignalSurrogate, errors: np.ndarray, within: PriorBox
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Prior quantiles [d] in a box at which the expected output is nearest to what was observed, and
+    """Prior quantiles [d] in a box at which the expected output is nearest to that observed, and
     the covariance [m, m] of the simulator's own noise, of which there are draws [n, m]."""
     assert surrogate.known is not None
     own = smooth_covariance(errors, surrogate.output.layout, surrogate.output.long)
