@@ -168,8 +168,8 @@ def level(theta, seeds):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [1.0, 4.0], ids=["as large as usual", "four times as large"])
-def test_a_posterior_allows_for_what_is_not_known_of_the_usual_residuals_size(size):
+@pytest.mark.parametrize("size", [1.0, 4.0], ids=["as large as learned", "four times as large"])
+def test_a_posterior_allows_for_what_is_not_known_of_the_model_errors_size(size):
     """White residuals whose variance is known as from 3 numbers: the level's posterior is Student's
     t, and as wide as the residuals that are seen."""
     rng, n, sd, freedom = np.random.default_rng(0), 30, 0.05, 3

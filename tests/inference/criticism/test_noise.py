@@ -189,10 +189,10 @@ def test_residuals_of_the_same_experiment_say_where_it_errs_again(clean):
     assert (found.freedom, other.freedom) == (3, 3)
 
 
-def test_what_is_expected_of_a_simulator_is_right_as_often_as_it_says():
-    """Drawn together from the model in three regimes: whitened misses are chi-square."""
+@pytest.mark.parametrize("away", [[0.0, 0.0], [0.5, -1.0]], ids=["one regime", "three regimes"])
+def test_what_is_expected_of_a_simulator_is_right_as_often_as_it_says(away):
+    """Drawn together from the model: misses, whitened, are chi-square."""
     at, drawn = Layout(np.repeat([0, 1], 30), np.tile(np.arange(30), 2)), 200
-    away = [0.5, -1.0]
     places = np.array([0.0, *away])
     over = np.exp(-0.5 * np.subtract.outer(places, places) ** 2)
     over = REPEATED * over + (1.0 - REPEATED) * np.eye(3)
