@@ -137,10 +137,11 @@ def _densities(
     filler = np.repeat(truth[None], plan.draws - len(draws), axis=0)
     rows = np.concatenate([truth[None], draws, filler])
     values = float64(log_density(as_theta(rows, plan.names)))
-    if values.shape != (len(rows),):
-        raise ValueError(f"log_density must return shape {(len(rows),)}, got {values.shape}")
-    if np.isnan(values).any():
-        raise ValueError("log_density must not be NaN at the truth or at a draw")
+    if values.shape != (len(rows),) or np.isnan(values).any():
+        raise ValueError(
+            f"log_density must return shape {(len(rows),)} without NaN, got {values.shape} with "
+            f"{int(np.isnan(values).sum())}"
+        )
     return values[: 1 + len(draws)]
 
 

@@ -200,6 +200,15 @@ def test_what_a_user_accepts_changes_no_verdict(criticised, drifting):
         assert found.verdict == drifting.verdict
         assert found.accepted == names == tuple(found.coefficients)
         assert found.extended is not None and set(found.extended.names) == set(names)
+        assert found.leading.refitted
+
+
+def test_two_effects_are_named_together_and_one_that_adds_nothing_is_not_needed(criticised):
+    acting = {name: EXTENSIONS[name] for name in ("offset", "drift", "delay")}
+    found = criticised(experiment(drift=0.06, offset=0.3), acting)
+    assert set(found.accepted) == {"offset", "drift"}
+    pairs = {frozenset(one.names): one.needed for one in found.candidates if len(one.names) == 2}
+    assert pairs == {frozenset({"offset", "drift"}): True, frozenset({"offset", "delay"}): False}
 
 
 def test_effects_that_fail_together_are_accepted_as_they_are_alone(criticised):
