@@ -123,6 +123,14 @@ def test_missing_samples_are_left_out():
     assert found.label == "gappy" and found.before == pytest.approx(expected)
 
 
+def test_the_mean_of_few_runs_is_noisy_too():
+    """Of three values, whose variances are those of the runs: half as much again for two runs."""
+    runs = np.random.default_rng(0).normal(size=(2, 2, 3))
+    experiment = criticism.Experiment(len, np.zeros(3), criticism.KnownNoise(0.1))
+    own = np.var(runs, axis=1, ddof=1).mean()
+    assert gap(experiment, *runs, 0).noise ** 2 == pytest.approx(0.1**2 + 1.5 * own)
+
+
 # Which experiment next?
 
 SAMPLES, SD, REPEATS = 120, 0.1, 40
