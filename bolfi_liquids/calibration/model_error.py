@@ -15,8 +15,9 @@ from .noise import sensor_noise
 from .stirs import camera_noise, frame_interval, same_experiment, same_rate, stir_experiment
 
 if TYPE_CHECKING:
+    from .. import inference
     from ..inference import Prior
-    from ..inference.criticism import Extension, Report, SumOfNoises, UsualResidual
+    from ..inference.criticism import Extension, Report, SumOfNoises
     from ..inference.simulations import Compute
 
 STARTING_RUNS = 4  # of each clean recording, all over the prior; as many follow near the best
@@ -126,7 +127,7 @@ def usual_for(
     viscosity: float | None,
     *,
     elsewhere: bool = False,
-) -> "UsualResidual | None":
+) -> "inference.criticism.ModelError | None":
     """Usual error of the simulator at a viscosity [Pa s]; None without clean recordings.
 
     Args:
@@ -136,18 +137,22 @@ def usual_for(
         viscosity: None where it is not known.
         elsewhere: Whether it is for a path of which there is no clean recording.
     """
-    from ..inference.criticism import KnownNoise, usual_residual
+    from ..inference.criticism import CleanData, KnownNoise, learned_model_error
 
     if not clean:
         return None
     only = stirring.recordings[0] if len(stirring.recordings) == 1 and not elsewhere else None
     same = [only is not None and same_experiment(one.recording, only) for one in clean]
-    # the whole recording tells white noise better than the short rest tells correlated noise
-    noises = [KnownNoise(sensor_noise(one.recording.inclination)) for one in clean]
     distances = regime_distance(
         [one.viscosity for one in clean], viscosity, stirring.least_viscosity
     )
-    return usual_residual([one.residual for one in clean], noises, same, distances)
+    # the whole recording tells white noise better than the short rest tells correlated noise
+    return learned_model_error(
+        [
+            CleanData(one.residual, KnownNoise(sensor_noise(one.recording.inclination)), *where)
+            for one, *where in zip(clean, same, distances, strict=True)
+        ]
+    )
 
 
 def regime_distance(
@@ -180,7 +185,7 @@ class ModelError:
             of the simulator.
     """
 
-    usual: "UsualResidual"
+    usual: "inference.criticism.ModelError"
     clean: tuple[str, ...] = ()
 
     @property

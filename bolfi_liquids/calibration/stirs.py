@@ -17,8 +17,8 @@ if TYPE_CHECKING:
         AutoregressiveNoise,
         Experiment,
         Extension,
+        ModelError,
         Noise,
-        UsualResidual,
         Window,
     )
 
@@ -88,7 +88,7 @@ def held_out_noise(one: Recording, fitted: Sequence[Recording]) -> "Autoregressi
 def stir_experiment(
     stirring: StirSimulator,
     cameras: "AutoregressiveNoise",
-    usual: "UsualResidual | None",
+    usual: "ModelError | None",
     label: str,
 ) -> "Experiment":
     """Recordings of one liquid, with the cameras' noise and the simulator's usual residual."""

@@ -148,11 +148,11 @@ def _residual(
 ) -> "Dataset":
     from xarray import Dataset
 
-    columns = {"observed": source.observed}
+    columns = {"observed": source.experiment.observed}
     for when, model in {"before": source.base.hypothesis, "after": source.extended}.items():
         if model is not None:
             left, sd = _left(model)
-            columns |= {f"expected_{when}": source.observed - left, f"sd_{when}": sd}
+            columns |= {f"expected_{when}": source.experiment.observed - left, f"sd_{when}": sd}
     return Dataset({key: (dims, values, units) for key, values in columns.items()})
 
 

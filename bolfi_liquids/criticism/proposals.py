@@ -11,7 +11,7 @@ from .pour_noise import PourNoise
 from .pours import OUTCOMES, Fractions
 
 if TYPE_CHECKING:
-    from ..inference.criticism import Noise, Proposal, UsualResidual
+    from ..inference.criticism import ModelError, Noise, Proposal
     from ..models import Cups
 
 FASTER_FACTOR, SLOWER_FACTOR = 1.6, 0.5
@@ -25,7 +25,7 @@ MAX_RADIUS_SHARE = 0.8
 
 
 def stir_proposals(
-    stirring: StirSimulator, noise: "Noise", usual: "UsualResidual | None"
+    stirring: StirSimulator, noise: "Noise", usual: "ModelError | None"
 ) -> list["Proposal"]:
     """The first recording's rig on other paths, seen with the same cameras' noise.
 

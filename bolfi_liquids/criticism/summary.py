@@ -139,18 +139,21 @@ class GapSummary:
     @classmethod
     def of(cls, source: "inference.criticism.Criticism") -> Self:
         """From what the engine concluded on stirs."""
-        from ..inference.criticism import beyond
+        from ..inference.criticism import excess_rms
+        from ..inference.criticism.measurement_noise import samples
 
         best, base = source.leading, source.base.hypothesis
         gaps = () if best is None else source.gaps.get(best.names, ())
-        noise = rms(np.sqrt(np.diag(base.own) + np.diag(source.measurement)))
-        known = float(np.hypot(noise, source.usual))
+        data = source.experiment
+        measured = data.measurement.covariance(samples(data.observed))
+        noise = rms(np.sqrt(np.diag(base.own) + np.diag(measured)))
+        known = float(np.hypot(noise, data.model_error_rms))
         before, after = _rms(base), None if best is None else _rms(best.hypothesis)
         numbers = {
-            "before": beyond(before, known),
-            "after": None if after is None else beyond(after, known),
+            "before": excess_rms(before, known),
+            "after": None if after is None else excess_rms(after, known),
             "noise": noise,
-            "usual": source.usual,
+            "usual": data.model_error_rms,
             "rms_before": before,
             "rms_after": after,
         }
@@ -158,7 +161,7 @@ class GapSummary:
             "before": [gap.unexplained[0] for gap in gaps],
             "after": [gap.unexplained[1] for gap in gaps],
             "noise": [gap.noise for gap in gaps],
-            "usual": [gap.usual for gap in gaps],
+            "usual": [gap.model_error for gap in gaps],
             "rms_before": [gap.before for gap in gaps],
             "rms_after": [gap.after for gap in gaps],
         }

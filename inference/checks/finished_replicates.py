@@ -1,7 +1,6 @@
 """Finished replicates as one value, from which every check is computed."""
 
 import zlib
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,10 +9,8 @@ import numpy as np
 from .._lazy import xr
 from ..arguments import (
     check_function,
-    check_kind,
     checked_array,
     checked_mapping,
-    checked_number,
 )
 from ..prior import Prior
 from .one_replicate import Replicate, as_theta
@@ -23,7 +20,6 @@ LOG_DENSITY = "log_density"
 
 Quantity = Callable[[Mapping[str, np.ndarray], np.ndarray], np.ndarray]
 """(theta: name -> [n], observed) -> [n]: a number that is checked like a parameter."""
-
 
 Values = dict[str, tuple[np.ndarray, np.ndarray]]
 """Quantity -> (its value at the truths [R], at the draws [R, L] with NaN after the last)."""
@@ -51,10 +47,8 @@ class Replicates:
         return len(self.finished)
 
     def __repr__(self) -> str:
-        return (
-            f"Replicates({self.prior}, finished: {len(self)}, failed: {len(self.failed)}, "
-            f"draws of each: {self.most})"
-        )
+        text = f"{len(self)} replicates, up to {self.most} independent draws each"
+        return f"{text}; {len(self.failed)} more failed" if self.failed else text
 
     @property
     def index(self) -> np.ndarray:
@@ -147,10 +141,6 @@ class Replicates:
             )
         return said
 
-    def __str__(self) -> str:
-        text = f"{len(self)} replicates, up to {self.most} independent draws each"
-        return f"{text}; {len(self.failed)} more failed" if self.failed else text
-
     def to_dataset(self) -> "xr.Dataset":
         """Truths and independent draws by parameter, effective sample sizes and seconds."""
         variables: dict[str, tuple[list[str], np.ndarray]] = {
@@ -162,26 +152,6 @@ class Replicates:
             variables[name] = (["replicate", "draw"], draws)
         attributes = {"seed": self.seed, "failed": len(self.failed)}
         return xr.Dataset(variables, {"replicate": self.index}, attributes)
-
-
-class Judged(ABC):
-    """The result of a check; it is `ok` unless it warns."""
-
-    @property
-    @abstractmethod
-    def warnings(self) -> list[str]:
-        """Warnings about the pipeline."""
-
-    @property
-    def ok(self) -> bool:
-        """No warning."""
-        return not self.warnings
-
-
-def check_judged(made: object, alpha: object) -> None:
-    """Raise ValueError unless these are replicates and a rate of false alarms."""
-    check_kind("made", made, Replicates)
-    checked_number("alpha", alpha, lambda a: 0.0 < a < 1.0, "a number between 0 and 1")
 
 
 def _padded(rows: np.ndarray, length: int) -> np.ndarray:
@@ -208,17 +178,3 @@ def _evaluated(
             f"got shape {values.shape} with {int(np.isnan(values).sum())} NaN"
         )
     return values
-
-
-def table(
-    heading: str, columns: Sequence[str], rows: Sequence[Sequence[str]], warnings: Sequence[str]
-) -> str:
-    """A heading, aligned columns (the first to the left), and what was found wrong."""
-    cells = [list(columns), *map(list, rows)]
-    widths = [max(len(row[j]) for row in cells) for j in range(len(columns))]
-    lines = [
-        "  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]).rstrip()
-        for row in cells
-    ]
-    verdict = [f"! {warning}" for warning in warnings] or ["ok"]
-    return "\n".join([heading, *lines, *verdict])

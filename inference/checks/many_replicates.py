@@ -1,6 +1,8 @@
-"""Running a pipeline many times on data whose truth is known."""
+"""Running a pipeline many times on data whose truth is known; every replicate is kept on disk."""
 
-from collections.abc import Callable, Generator
+import io
+import json
+from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Executor, as_completed
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -20,13 +22,27 @@ from ..arguments import (
 from ..describe import describe
 from ..prior import Prior, checked_prior
 from ..progress import progress_bar
+from ..simulations.database import disk_errors, opened_database
 from ..simulations.executors import Workers, open_executor
-from ..simulations.failures import is_unusable
+from ..simulations.failures import failure_columns, failure_of, is_unusable
 from ..simulations.job import BATCH
 from ..types import Simulator
 from .finished_replicates import Replicates
 from .one_replicate import Observe, Pipeline, Replicate, ReplicatePlan, run_replicate
-from .store import ReplicateStore
+
+SCHEMA = """
+CREATE TABLE IF NOT EXISTS settings (name TEXT PRIMARY KEY, value TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS replicate (
+    number    INTEGER PRIMARY KEY,
+    arrays    BLOB NOT NULL,
+    effective REAL,
+    seconds   REAL NOT NULL,
+    stage     TEXT,
+    failure   TEXT,
+    error     TEXT
+);
+"""
+ARRAYS = ("truth", "observed", "draws", "log_density")
 
 BLOCK = 256  # truths are made in blocks of one shape, so that JAX seldom compiles
 
@@ -101,7 +117,7 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     truths = _truths(prior, n, seed)
     with ExitStack() as stack:
         workers = stack.enter_context(open_executor(executor))
-        kept = stack.enter_context(ReplicateStore(store, settings))
+        kept = stack.enter_context(closing(ReplicateStore(store, settings)))
         done = {
             number: replicate
             for number, replicate in kept.load().items()
@@ -160,3 +176,82 @@ def _run(
     finally:
         for future in futures:
             future.cancel()  # after a mistake or Ctrl-C there is no use in the rest
+
+
+class ReplicateStore:
+    """Replicates of one pipeline under one set of settings, in one SQLite file.
+
+    A write is one committed transaction in WAL mode: what `put` has returned from survives
+    the death of the process.
+
+    Args:
+        path: File, created if missing; ":memory:" keeps nothing.
+        settings: All that a replicate depends on, as text. A file keeps the settings of its
+            first use.
+
+    Raises:
+        ValueError: the file is no such store, holds replicates made with other settings, or
+            cannot be read and written.
+    """
+
+    def __init__(self, path: str | Path, settings: Mapping[str, str]):
+        self.path = str(path)
+        self._connection = opened_database(path, SCHEMA, "replicate store")
+        execute = self._connection.execute
+        with ExitStack() as undo, disk_errors(path):
+            undo.callback(self.close)
+            execute("BEGIN IMMEDIATE")  # two processes may begin together
+            stored = dict(execute("SELECT name, value FROM settings").fetchall())
+            if not stored:
+                self._connection.executemany("INSERT INTO settings VALUES (?, ?)", settings.items())
+            execute("COMMIT")
+            both = {name: (stored.get(name), settings.get(name)) for name in {*stored, *settings}}
+            unlike = [
+                f"{name}: stored {json.dumps(one)}, now {json.dumps(other)}"
+                for name, (one, other) in sorted(both.items())
+                if stored and one != other
+            ]
+            if unlike:
+                raise ValueError(
+                    f"{path} holds replicates made with other settings ({'; '.join(unlike)}); "
+                    "restore these, or choose another file"
+                )
+            undo.pop_all()
+
+    def load(self) -> dict[int, Replicate]:
+        """All replicates kept, by number."""
+        rows = self._connection.execute(
+            "SELECT number, arrays, effective, seconds, stage, failure, error FROM replicate "
+            "ORDER BY number"
+        )
+        return {row[0]: _from_row(row) for row in rows}
+
+    def put(self, replicate: Replicate) -> None:
+        """Keep a replicate; a finished one is never replaced, a failed one is."""
+        held = {name: getattr(replicate, name) for name in ARRAYS}
+        file = io.BytesIO()
+        np.savez_compressed(file, **{k: v for k, v in held.items() if v is not None})
+        # SQLite takes NaN for NULL
+        kept = (replicate.number, file.getvalue(), replicate.effective, replicate.seconds)
+        row = (*kept, replicate.stage, *failure_columns(replicate.error))
+        with disk_errors(self.path):
+            self._connection.execute(
+                "INSERT INTO replicate VALUES (?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET "
+                "(arrays, effective, seconds, stage, failure, error) = (excluded.arrays, "
+                "excluded.effective, excluded.seconds, excluded.stage, excluded.failure, "
+                "excluded.error) WHERE error IS NOT NULL",
+                row,
+            )
+
+    def close(self) -> None:
+        self._connection.close()
+
+
+def _from_row(row: tuple) -> Replicate:
+    """The replicate of a row's columns, in the order of `load`."""
+    number, arrays, effective, seconds, stage, kind, text = row
+    with np.load(io.BytesIO(arrays), allow_pickle=False) as file:
+        held = {"log_density": None, **file}
+    size = np.nan if effective is None else effective
+    how = {"effective": size, "seconds": seconds, "stage": stage, "error": failure_of(kind, text)}
+    return Replicate(number, **how, **held)

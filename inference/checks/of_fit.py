@@ -15,16 +15,13 @@ from ..criticism.of_fit import noise_of, recipe_of
 from ..prior import Prior
 from ..result import Fit, Recipe
 from ..types import Simulator
-from .finished_replicates import Judged
-from .intervals import Coverage, coverage
 from .many_replicates import replicates
 from .one_replicate import LogDensity, Observe
-from .random_points import Tarp, tarp
-from .uniformity import SBC, sbc
+from .posterior_checks import SBC, Coverage, Tarp, coverage, sbc, tarp
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class FitCheck(Judged):
+class FitCheck:
     """Three checks of the same replicates.
 
     Attributes:
@@ -42,6 +39,11 @@ class FitCheck(Judged):
         """Warnings about the pipeline, each once."""
         parts = (self.sbc, self.coverage, self.tarp)
         return list(dict.fromkeys(warning for part in parts for warning in part.warnings))
+
+    @property
+    def ok(self) -> bool:
+        """No warning."""
+        return not self.warnings
 
     def __repr__(self) -> str:
         return "\n\n".join(map(str, (self.sbc, self.coverage, self.tarp)))

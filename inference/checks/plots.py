@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ..figures import COLOURS, GREY, INK, bare, check_axes
-from . import bands
+from . import ranks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +19,7 @@ LEGEND_BELOW: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -
 def band(ax: "Axes", n: int, draws: int, level: float = 0.95, diagonal: bool = False) -> np.ndarray:
     """Draw the simultaneous band of n ranks, less the diagonal unless that is drawn, too; returns
     where the band is known, z [draws]."""
-    limits = bands.band(n, draws, level)
+    limits = ranks.band(n, draws, level)
     z, last = closed(limits.z, 1.0), float(diagonal)
     line = z if diagonal else np.zeros_like(z)
     lower, upper = (

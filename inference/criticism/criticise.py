@@ -15,18 +15,12 @@ from ..simulations.bank import SimulationBank
 from ..simulations.compute import open_compute
 from ..simulations.executors import Workers
 from ..simulations.job import BATCH
-from .experiment import Experiment, Proposal
-from .held_out import Gap, gap, holds
-from .hypothesis import Hypothesis
-from .measurement_noise import Noise, samples
-from .misfit import Found, locate, null_draws
-from .model_extension import Extensions, check_extensions
-from .next_experiment import Suggestion, suggest
-from .posterior import Interval, Weighted, weighted_posterior
+from .experiment import Experiment, Extensions, Proposal, check_extensions
+from .held_out import Gap, Suggestion, gap, holds, suggest
+from .hypothesis import Hypothesis, Interval, Weighted, weighted_posterior
+from .misfit import Found, confusion, locate, null_draws
 from .search import Base, examine, explain
-from .signatures import confusion
 from .study import AllRunsFailed, Plan, Report, Study, silent
-from .usual_residual import model_error_rms, without_model_error
 from .verdict import REJECTION_LEVEL, Candidate, Verdict, VerdictKind, conclude, tied
 
 
@@ -44,9 +38,9 @@ class Criticism(Displayed):
         posterior: Of the extended model, or else of the base model.
         before, after: Where the data disagree with the base and with the extended model.
         suggestions: Experiments that would separate explanations, best first.
-        untested: Effects whose simulations failed, or that were not refitted, or could not be
-            simulated for the held-out data, though they might explain the difference.
-        observed, noise: The experiment's.
+        untested: Effects that were not refitted, or could not be simulated, here or for the
+            held-out data, though they might explain the difference: name -> why.
+        experiment: The data, their noise and the simulator.
         units: Of the effects' coefficients.
         tied: Names of each explanation that remains, best first.
         simulations: Runs that were asked for, those found in the bank included.
@@ -61,36 +55,35 @@ class Criticism(Displayed):
     before: tuple[Found, ...]
     after: tuple[Found, ...]
     suggestions: tuple[Suggestion, ...]
-    untested: tuple[str, ...]
-    observed: np.ndarray
-    noise: Noise
+    untested: Mapping[str, str]
+    experiment: Experiment
     units: Mapping[str, str]
     tied: tuple[tuple[str, ...], ...]
     simulations: int
 
     def _shown(self) -> list[tuple[str, str]]:
         sizes = [
-            (
-                f"{name}",
-                f"{one.mean:.3g} [{one.q05:.3g}, {one.q95:.3g}] {self.units[name]}".rstrip(),
-            )
+            (name, f"{one.mean:.3g} [{one.q05:.3g}, {one.q95:.3g}] {self.units[name]}".rstrip())
             for name, one in self.coefficients.items()
         ]
-        suggested = [str(one.label) for one in self.suggestions[:1]]
+        untested = [("not tested", f"{name} ({why})") for name, why in self.untested.items()]
+        inert = ", ".join(self.base.inert)
+        suggested = [("suggested experiment", str(one.label)) for one in self.suggestions[:1]]
         return [
             ("verdict", self.verdict.reason),
             ("next", self.verdict.kind.advice),
             ("accepted", ", ".join(self.accepted) or "none"),
             *sizes,
             ("explanations tested", str(len(self.candidates))),
-            *(("not tested", ", ".join(self.untested)) for _ in self.untested[:1]),
-            *(("suggested experiment", one) for one in suggested),
+            *untested,
+            *([("changed no signal", f"{inert}; does the simulator read it?")] if inert else []),
+            *suggested,
             ("simulations", str(self.simulations)),
         ]
 
     @property
     def coefficients(self) -> dict[str, Interval]:
-        """Of the accepted effects."""
+        """Mean and 90 % interval of each accepted effect's coefficient."""
         return {name: self.posterior.interval(name) for name in self.accepted}
 
     @property
@@ -121,17 +114,6 @@ class Criticism(Displayed):
         """The accepted explanation, or the best of those that are tied."""
         tied = self.tied[0] if self.verdict.kind is VerdictKind.TIE else None
         return _among(self.candidates, self.accepted) or _among(self.candidates, tied)
-
-    @property
-    def measurement(self) -> np.ndarray:
-        """Covariance of the data's own noise, without what is usual for the simulator [n, n]."""
-        return without_model_error(self.noise).covariance(samples(self.observed))
-
-    @property
-    def usual(self) -> float:
-        """RMS of the simulator's usual error beyond its known residual; 0 where it is not
-        known."""
-        return model_error_rms(self.noise, self.observed)
 
     @property
     def confusion(self) -> np.ndarray:
@@ -193,16 +175,25 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     """
     checked_prior(prior)
     check_extensions(prior, extensions)
-    _check_experiments(experiment, held_out, proposals)
+    check_kind("experiment", experiment, Experiment)
+    _check_others("held_out", held_out, Experiment)
+    _check_others("proposals", proposals, Proposal)
+    for one in held_out:
+        if np.array_equal(one.observed, experiment.observed, equal_nan=True):
+            raise ValueError(
+                f"the held-out experiment {one.label!r} holds the very data that are fitted; "
+                "nothing can be proved on them: give data of another run"
+            )
+    check_kind("accept", accept, list | tuple | None)
+    if unknown := [name for name in accept or () if name not in tuple(extensions)]:
+        raise ValueError(
+            f"cannot accept {', '.join(map(repr, unknown))}; there are {', '.join(extensions)}"
+        )
     checked_number("level", level, lambda p: 0.0 < p < 1.0, "a number between 0 and 1")
     check_kind("plan", plan, Plan | None)
     checked_integer("seed", seed, 0)
     check_function("report", report)
     _check_earlier(earlier)
-    _check_held_out(experiment, held_out)
-    _check_accept(accept, extensions)
-    _check_told_apart(held_out)
-    _check_told_apart(proposals)
     count = 0
 
     def counted(phase: str, finished: int) -> None:
@@ -212,13 +203,16 @@ def criticise(  # noqa: PLR0913  the one call that most users make
 
     with open_compute(executor, timeout, batch, bank) as compute:
         study = Study(experiment, prior, extensions, compute, plan or Plan(), seed, counted)
-        base, untested = examine(study, None if earlier is None else study.table(*earlier))
+        base = examine(study, None if earlier is None else study.table(*earlier))
         candidates, members = [], []
         if accept is not None or base.check.p_value < level:
-            candidates, members = _try(study, base, accept, held_out)
+            candidates, members = _explanations(study, base, accept, held_out)
         verdict = conclude(base.check, members, level)
-        suggestions = suggest(study, proposals, _rivals(verdict, candidates, members))
-    accepted = tuple(accept) if accept is not None else _named(verdict)
+        rivals = _rivals(verdict, candidates, members)
+        best = {" with ".join(one.names): one.hypothesis.best for one in rivals}
+        suggestions = suggest(study, proposals, best)
+    named = verdict.effects if verdict.kind is VerdictKind.EFFECT else ()
+    accepted = tuple(accept) if accept is not None else named
     leading = _among(candidates, accepted)
     extended = leading.hypothesis if leading else None
     left = []
@@ -235,16 +229,15 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         before=tuple(locate(base.hypothesis, experiment.windows, base.null)),
         after=tuple(left),
         suggestions=tuple(suggestions),
-        untested=tuple(dict.fromkeys((*untested, *_left_out(candidates)))),
-        observed=experiment.observed,
-        noise=experiment.noise,
+        untested=base.untested | _left_out(candidates),
+        experiment=experiment,
         units={name: one.unit for name, one in extensions.items()},
         tied=tuple(one.names for one in tied(members)),
         simulations=count,
     )
 
 
-def _try(
+def _explanations(
     study: Study, base: Base, accept: Sequence[str] | None, held_out: Sequence[Experiment]
 ) -> tuple[list[Candidate], list[Candidate]]:
     """Fit explanations, and test those that passed on the held-out data.
@@ -277,16 +270,16 @@ def _rivals(
     return []
 
 
-def _left_out(candidates: Sequence[Candidate]) -> list[str]:
+def _left_out(candidates: Sequence[Candidate]) -> dict[str, str]:
     """Effects that alone would pass the test but were not refitted, and those of explanations that
-    could not be simulated for held-out data."""
-    alone = [c for c in candidates if len(c.names) == 1 and c.passes and not c.refitted]
-    unpredicted = [c for c in candidates if not c.predicted]
-    return [name for c in (*alone, *unpredicted) for name in c.names]
-
-
-def _named(verdict: Verdict) -> tuple[str, ...]:
-    return verdict.effects if verdict.kind is VerdictKind.EFFECT else ()
+    could not be simulated for held-out data: name -> why."""
+    found: dict[str, str] = {}
+    for one in candidates:
+        if not one.predicted:
+            found |= dict.fromkeys(one.names, "no simulation for the held-out data succeeded")
+        elif len(one.names) == 1 and one.passes and not one.refitted:
+            found |= dict.fromkeys(one.names, "it was not refitted")
+    return found
 
 
 def _among(candidates: Sequence[Candidate], names: Sequence[str] | None) -> Candidate | None:
@@ -320,17 +313,19 @@ def _gaps(
     return gaps
 
 
-def _check_experiments(
-    experiment: Experiment, held_out: Sequence[Experiment], proposals: Sequence[Proposal]
-) -> None:
-    check_kind("experiment", experiment, Experiment)
-    for name, given, kind in (
-        ("held_out", held_out, Experiment),
-        ("proposals", proposals, Proposal),
-    ):
-        check_kind(name, given, list | tuple)
-        for one in given:
-            check_kind(f"each of {name}", one, kind)
+def _check_others(name: str, given: Any, kind: type) -> None:
+    """Raise ValueError unless these are experiments or proposals that the bank tells apart."""
+    check_kind(name, given, list | tuple)
+    for one in given:
+        check_kind(f"each of {name}", one, kind)
+    for one, other in combinations(given, 2):
+        told_apart = one.identity or other.identity or one.label != other.label
+        if not told_apart and one.simulate != other.simulate:
+            raise ValueError(
+                f"two experiments {one.label!r} of different simulators have no identity, so the "
+                "bank would take the runs of one for the other's: give each its own identity or "
+                "label"
+            )
 
 
 def _check_earlier(earlier: Any) -> None:
@@ -340,32 +335,3 @@ def _check_earlier(earlier: Any) -> None:
             "earlier must be (theta, signals, seeds), theta a mapping of names to values, or None, "
             f"got {earlier!r:.100}"
         )
-
-
-def _check_held_out(experiment: Experiment, held_out: Sequence[Experiment]) -> None:
-    for one in held_out:
-        if np.array_equal(one.observed, experiment.observed, equal_nan=True):
-            raise ValueError(
-                f"the held-out experiment {one.label!r} holds the very data that are fitted; "
-                "nothing can be proved on them: give data of another run"
-            )
-
-
-def _check_accept(accept: Sequence[str] | None, extensions: Extensions) -> None:
-    check_kind("accept", accept, list | tuple | None)
-    unknown = [name for name in accept or () if name not in tuple(extensions)]
-    if unknown:
-        raise ValueError(
-            f"cannot accept {', '.join(map(repr, unknown))}; there are {', '.join(extensions)}"
-        )
-
-
-def _check_told_apart(experiments: Sequence[Experiment] | Sequence[Proposal]) -> None:
-    for one, other in combinations(experiments, 2):
-        named = one.identity or other.identity or one.label != other.label
-        if not named and one.simulate != other.simulate:
-            raise ValueError(
-                f"two experiments {one.label!r} of different simulators have no identity, so the "
-                "bank would take the runs of one for the other's: give each its own identity or "
-                "label"
-            )

@@ -1,14 +1,37 @@
-"""Data of one experiment, and the simulator that should explain them."""
+"""Data of an experiment, the simulator that should explain them, and the effects it may lack."""
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+import numpyro.distributions as dist
 
-from ..arguments import check_function, check_kind, check_text, checked_array, checked_integer
+from ..arguments import (
+    check_function,
+    check_kind,
+    check_text,
+    checked_array,
+    checked_integer,
+    checked_number,
+)
+from ..prior import Prior
 from ..types import Simulator
-from .measurement_noise import Noise, check_noise
-from .misfit import Window
-from .usual_residual import expected_model_error
+from .measurement_noise import Noise, check_noise, samples
+from .model_errors import split_noise
+
+
+class Window(NamedTuple):
+    """Samples that are looked at together.
+
+    Attributes:
+        label: What they have in common, for a person and for tables.
+        samples: Which of the observed, bool [*signal_shape].
+    """
+
+    label: Mapping[str, object]
+    samples: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +77,29 @@ class Experiment:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the output."""
+        """Shape of the output."""
         return self.observed.shape
+
+    @property
+    def measurement(self) -> Noise:
+        """The noise without the model error."""
+        return split_noise(self.noise)[0]
+
+    @property
+    def model_error_rms(self) -> float:
+        """RMS of the simulator's usual error beyond its known residual; 0 where it is not known."""
+        error = split_noise(self.noise)[1]
+        if error is None:
+            return 0.0
+        return float(np.sqrt(np.mean(np.diag(error.covariance(samples(self.observed))))))
 
     @property
     def corrected(self) -> np.ndarray:
         """Observed less the simulator's known residual [*signal_shape]."""
-        return self.observed - expected_model_error(self.noise, self.observed)
+        error, expected = split_noise(self.noise)[1], np.zeros(self.shape)
+        if error is not None:
+            expected[np.isfinite(self.observed)] = error.mean(samples(self.observed))
+        return self.observed - expected
 
 
 @dataclass(frozen=True)
@@ -88,3 +127,58 @@ class Proposal:
         check_kind("shape", self.shape, tuple)
         for length in self.shape:
             checked_integer("each of shape", length)
+
+
+@dataclass(frozen=True)
+class Extension:
+    """An effect that a simulator can be asked for.
+
+    Attributes:
+        prior: Of its coefficient; it also says how far runs may go to learn what the effect does.
+        neutral: Coefficient at which the simulator is as without it.
+        unit: Of the coefficient.
+        text: One sentence for a person.
+
+    Raises:
+        ValueError: `neutral` is not finite, or not in the prior's support.
+    """
+
+    prior: dist.Distribution
+    neutral: float = 0.0
+    unit: str = "1"
+    text: str = ""
+
+    def __post_init__(self) -> None:
+        support = Prior({"coefficient": self.prior})
+
+        def possible(at: float) -> bool:
+            return math.isfinite(at) and bool(support.contains({"coefficient": np.asarray(at)}))
+
+        due = "finite and in the prior's support"
+        checked_number("an extension's neutral", self.neutral, possible, due)
+        check_text("unit", self.unit)
+        check_text("text", self.text)
+
+
+Extensions = Mapping[str, Extension]
+
+
+def extended(prior: Prior, extensions: Extensions, names: tuple[str, ...]) -> Prior:
+    """The prior of the base parameters and of the named coefficients."""
+    added = {name: extensions[name] for name in names}
+    return Prior(
+        {**prior.distributions, **{name: e.prior for name, e in added.items()}},
+        {**prior.units, **{name: e.unit for name, e in added.items()}},
+    )
+
+
+def check_extensions(prior: Prior, extensions: object) -> None:
+    """Raise ValueError unless they map new names to extensions."""
+    if not isinstance(extensions, Mapping) or not extensions:
+        raise ValueError(
+            f"extensions must map at least one name to an Extension, got {extensions!r:.100}"
+        )
+    for name, extension in extensions.items():
+        check_kind(f"extension {name!r}", extension, Extension)
+        if name in prior.names:
+            raise ValueError(f"extension {name!r} has the name of a parameter of the prior")

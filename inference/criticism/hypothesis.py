@@ -1,29 +1,33 @@
-"""A model, base or extended, fitted to data: what is left, and how large that may be."""
+"""A model, base or extended, fitted to data: what is left, how large that may be, and what it says
+of the parameters."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.special import ndtr
 
 from .._float64 import in_float64
 from ..bolfi import Bolfi
 from ..gp.optimise import minimise_in_box
 from ..prior import Prior
 from ..result import Fit
+from ..sampling.importance import explore, weighted_quantiles
+from ..sampling.target import Target
 from ..surrogates.measurement_noise import Layout, Nodes, Reduced
 from ..surrogates.output_vectors import Output
 from ..surrogates.signal import SignalFamily, SignalSurrogate
 from ..surrogates.signal_likelihood import SignalLikelihood, eliminate, scores
 from .measurement_noise import Noise, samples
-from .prior_boxes import LATER_HALF_WIDTH, PriorBox, around, intersection
+from .model_errors import split_noise
 from .run_noise import own_errors, resized, smooth_covariance
-from .runs import Runs
-from .usual_residual import model_error_part
+from .runs import LATER_HALF_WIDTH, PriorBox, Runs
 
 COMPONENTS = 10
-SIZES = 12  # of the usual residual, that the likelihood is averaged over
+SIZES = 12  # of the model error, that the likelihood is averaged over
 SLOPE_STEP = 0.02  # of prior quantiles, for slopes
 PRIOR_END = 1e-4  # quantile of a prior from which a parameter is at its end
 INDEPENDENT_SLOPE = 1e-8  # relative size below which a slope adds nothing to those before
@@ -35,8 +39,8 @@ class Hypothesis:
 
     Attributes:
         names: Effects that act.
-        fit: The engine's; its likelihood takes all noise from here, but for the usual residual's
-            size, over which it is averaged, and holds near `u`.
+        fit: The engine's; its likelihood takes all noise from here, but for the model error's size,
+            over which it is averaged, and holds near `u`.
         within: Where it was simulated.
         u: Where in there the expected output is nearest to what was observed, prior quantiles [d].
         difference: Observed less expected there [m].
@@ -103,7 +107,7 @@ class Hypothesis:
     @cached_property
     @in_float64
     def sd(self) -> np.ndarray:
-        """Of the parameters in prior quantiles, by Laplace's approximation [d]."""
+        """Sds of the parameters in prior quantiles, by Laplace's approximation [d]."""
         # a uniform quantile has the variance 1/12
         information = self.slopes.T @ self.slopes + 12.0 * np.eye(len(self.u))
         return np.sqrt(np.diag(np.linalg.inv(information)))
@@ -116,6 +120,10 @@ class Hypothesis:
     def project(self, white: np.ndarray) -> np.ndarray:
         """Whitened columns [m, n] less what the parameters absorb of them."""
         return white - self.tangents @ (self.tangents.T @ white)
+
+    def visible(self, rows: np.ndarray) -> np.ndarray:
+        """Values [n, m] -> whitened columns [m, n] of what the parameters do not absorb."""
+        return self.project(self.whiten(rows))
 
     @in_float64
     def expected(self, u: np.ndarray) -> np.ndarray:
@@ -146,14 +154,14 @@ def hypothesise(
         within: Where the effects were simulated. Elsewhere the emulator only guesses, and of all
             guesses some are near to whatever was observed.
     """
-    told = runs.of(names)
+    used = runs.of(names)
     # every component: a small effect may show in one that few runs hardly predict
     covariance = noise.covariance(samples(observed))
     fixed = {"misfit": 0, "components": COMPONENTS, "predicted": None, "varying_noise": False}
     family = SignalFamily(noise=covariance, **fixed)
     engine = Bolfi(prior, observed, surrogate=family)
-    theta = {name: told.theta[name] for name in prior.names}
-    engine.tell(theta, told.signals, told.seeds)
+    theta = {name: used.theta[name] for name in prior.names}
+    engine.tell(theta, used.signals, used.seeds)
     fit = engine.fit(warn=False)  # that a model cannot reach the data is what is looked for
     surrogate = fit.learned
     assert isinstance(surrogate, SignalSurrogate) and surrogate.known is not None
@@ -173,7 +181,7 @@ def hypothesise(
         own=own,
         noise=known,
     )
-    near_best = around(u, found.sd, LATER_HALF_WIDTH, most=np.inf)
+    near_best = PriorBox.around(u, found.sd, LATER_HALF_WIDTH, most=np.inf)
     sized, log_weight = _sized(noise, observed, surrogate)
     reduced = _reduced(surrogate, [own + one for one in sized])
     learned = replace(
@@ -181,7 +189,7 @@ def hypothesise(
         reduced=reduced._replace(log_weight=reduced.log_weight + log_weight),
         nodes=Nodes(*(np.zeros(len(sized)) for part in Nodes._fields)),
         log_prior=log_weight,
-        box=tuple(intersection(near_best, within)),
+        box=tuple(near_best.intersection(within)),
     )
     return replace(found, fit=replace(fit, learned=learned))
 
@@ -189,7 +197,7 @@ def hypothesise(
 def _nearest(
     surrogate: SignalSurrogate, errors: np.ndarray, within: PriorBox
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where in a box the expected output is nearest to what was observed, prior quantiles [d], and
+    """Prior quantiles [d] in a box at which the expected output is nearest to that observed, and
     the covariance [m, m] of the simulator's own noise, of which there are draws [n, m]."""
     assert surrogate.known is not None
     own = smooth_covariance(errors, surrogate.output.layout, surrogate.output.long)
@@ -203,10 +211,10 @@ def _sized(
 ) -> tuple[list[np.ndarray], np.ndarray]:
     """Covariances [m, m] that the noise may have, and their log weights.
 
-    Few clean data tell how large the usual residual is; the residual of these data tells more.
+    Few clean data tell how large the model error is; the residual of these data tells more.
     """
     assert surrogate.known is not None
-    known, error = surrogate.known.covariance, model_error_part(noise)
+    known, error = surrogate.known.covariance, split_noise(noise)[1]
     if error is None:
         return [known], np.zeros(1)
     part = surrogate.output.average_covariance(error.covariance(samples(observed)))
@@ -246,3 +254,46 @@ def _squared_distance(state: SignalLikelihood, u: np.ndarray) -> np.ndarray:
 def values_of(output: Output, drawn: np.ndarray) -> np.ndarray:
     """Draws [n, samples] in the flattened order as values [n, m]."""
     return output.average(drawn[:, output.rank].T).T
+
+
+class Interval(NamedTuple):
+    """Mean and 90 % interval of one parameter."""
+
+    mean: float
+    q05: float
+    q95: float
+
+
+class Weighted(NamedTuple):
+    """Points of a posterior in natural units, name -> [n], and their weights [n]."""
+
+    theta: dict[str, np.ndarray]
+    weights: np.ndarray
+
+    def draw(self, seed: int, count: int) -> dict[str, np.ndarray]:
+        """A systematic sample along the first parameter, name -> [count]."""
+        order = np.argsort(next(iter(self.theta.values())))
+        reached = np.cumsum(self.weights[order])
+        start = np.random.default_rng(seed).random()
+        at = np.searchsorted(reached, (start + np.arange(count)) / count * reached[-1])
+        chosen = order[np.minimum(at, len(order) - 1)]
+        return {name: values[chosen] for name, values in self.theta.items()}
+
+    def interval(self, name: str) -> Interval:
+        """Mean and 90 % interval of a parameter."""
+        values = self.theta[name]
+        low, high = weighted_quantiles(values, self.weights, (0.05, 0.95))
+        mean = np.average(values, weights=self.weights)
+        return Interval(float(mean), float(low), float(high))
+
+
+@in_float64
+def weighted_posterior(hypothesis: Hypothesis, seed: int = 0) -> Weighted:
+    """Adaptive importance sampling of a hypothesis's posterior, see `importance.explore`."""
+    surrogate, prior = hypothesis.surrogate, hypothesis.fit.prior
+    target = Target(surrogate.log_likelihood, len(prior))
+    found = explore(np.random.default_rng(seed), target)
+    used = np.isfinite(found.log_weights)
+    weights = np.exp(found.log_weights[used] - found.log_weights[used].max())
+    theta = prior.from_unit(ndtr(found.x[used]))
+    return Weighted(theta, weights / weights.sum())

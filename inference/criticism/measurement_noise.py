@@ -1,4 +1,4 @@
-"""What lies between a simulator's mean output and the data, besides the simulator's own noise."""
+"""Noise between a simulator's mean output and the data, besides the simulator's own noise."""
 
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -144,41 +144,20 @@ def rest_noise(
         ValueError: stretches of another shape, not finite, or such as leave fewer than eight
             samples to learn from; a channel in which nothing varies, which measures no noise.
     """
-    rests = [_checked_rest(rest) for rest in rests]
+    rests = [checked_array("each of rests", rest) for rest in rests]
+    for rest in rests:
+        if rest.ndim != 2 or not np.isfinite(rest).all():
+            raise ValueError(
+                "each of rests must be finite numbers [samples, channels], got the shape "
+                f"{rest.shape} with {np.sum(~np.isfinite(rest))} missing; one channel is "
+                "rest[:, None], and of a stretch with gaps give the stretches between them"
+            )
     freedom = sum((len(rest) - trend - 1) * rest.shape[1] for rest in rests)
     if freedom < 8:
         raise ValueError(
             f"the stretches at rest leave {freedom} samples to learn the noise from, of 8 needed; "
             "give longer ones"
         )
-    _check_varying(rests, trend)
-    log_weight, squares = np.transpose([_restricted(rests, rho, trend) for rho in CORRELATIONS])
-    log_weight = log_weight - 0.5 * freedom * np.log(squares)
-    weight = np.exp(log_weight - log_weight.max())
-    rng = np.random.default_rng(seed)
-    which = rng.choice(len(weight), draws, p=weight / weight.sum())
-    sd = np.sqrt(squares[which] / rng.chisquare(freedom, draws))
-    return AutoregressiveNoise(sd, CORRELATIONS[which], sum(rest.size for rest in rests))
-
-
-def _checked_rest(rest: np.ndarray) -> np.ndarray:
-    """A stretch [samples, channels] of finite numbers, or ValueError."""
-    array = checked_array("each of rests", rest)
-    if array.ndim != 2:
-        raise ValueError(
-            f"each of rests must have shape [samples, channels], got {array.shape}; one channel "
-            "is rest[:, None]"
-        )
-    if not np.isfinite(array).all():
-        raise ValueError(
-            f"rests must be finite, got {np.sum(~np.isfinite(array))} missing samples of "
-            f"{array.size}; give the stretches between them"
-        )
-    return array
-
-
-def _check_varying(rests: list[np.ndarray], trend: int) -> None:
-    """Raise ValueError if the polynomials leave nothing but rounding errors of some channel."""
     whole, left = np.concatenate(rests), [_detrended(rest, trend) for rest in rests]
     still = np.abs(np.concatenate(left)).max(0) <= ROUNDING * np.abs(whole).max(0)
     if still.any():
@@ -187,6 +166,13 @@ def _check_varying(rests: list[np.ndarray], trend: int) -> None:
             f"rests do not vary in channel {channel}, got {whole[:3, channel]} and so on: that "
             "measures no noise; leave the channel out, or give noise of known size"
         )
+    log_weight, squares = np.transpose([_restricted(rests, rho, trend) for rho in CORRELATIONS])
+    log_weight = log_weight - 0.5 * freedom * np.log(squares)
+    weight = np.exp(log_weight - log_weight.max())
+    rng = np.random.default_rng(seed)
+    which = rng.choice(len(weight), draws, p=weight / weight.sum())
+    sd = np.sqrt(squares[which] / rng.chisquare(freedom, draws))
+    return AutoregressiveNoise(sd, CORRELATIONS[which], sum(rest.size for rest in rests))
 
 
 def _detrended(rest: np.ndarray, degree: int) -> np.ndarray:

@@ -11,10 +11,8 @@ from ..surrogates.noise.by_mean import Plain, law_of
 from ..surrogates.noise.given import given_sds
 from ..surrogates.signal import SignalFamily, SignalSurrogate
 from .criticise import Criticism, criticise
-from .experiment import Experiment
+from .experiment import Experiment, Extensions, Window
 from .measurement_noise import DRAWS, AutoregressiveNoise, KnownNoise, Noise
-from .misfit import Window
-from .model_extension import Extensions
 
 
 def criticise_fit(

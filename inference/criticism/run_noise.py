@@ -8,7 +8,7 @@ from ..gp.process import leave_one_out
 from ..surrogates.emulator import Emulator
 from ..surrogates.measurement_noise import Layout
 from .measurement_noise import stationary
-from .usual_residual import positive_autocovariance
+from .model_errors import positive_autocovariance
 
 ALIKE_DISTANCE = 0.2  # of prior quantiles, over which a simulator's noise changes as a power
 PRIOR_RUNS = 0.1  # runs

@@ -6,21 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..prior import Prior
+from ..simulations.compute import Compute
+from .experiment import Experiment, Extensions
 from .hypothesis import Hypothesis
-from .misfit import Check
-from .prior_boxes import (
-    FIRST_HALF_WIDTH,
-    LATER_HALF_WIDTH,
-    PriorBox,
-    around,
-    everywhere,
-    hull,
-    sides,
-    with_whole_priors,
-)
-from .runs import Runs, joined
-from .signatures import Signature, scored_on_clean, signature
-from .study import MIN_EFFECT_RUNS, AllRunsFailed, Study
+from .misfit import Check, Signature, scored_on_clean, signature
+from .runs import FIRST_HALF_WIDTH, LATER_HALF_WIDTH, PriorBox, Runs, joined, sides
+from .study import MIN_EFFECT_RUNS, AllRunsFailed, Plan, Report, Study, silent
 from .verdict import FAR_BEHIND, TIE_MARGIN, Candidate, near_best
 
 BASE_PASSES = 6  # of runs of the base model, those after the first only until the fit is settled
@@ -30,34 +22,49 @@ MAX_DOUBT = 1.0  # of a settled fit: emulator's variance over all variance, summ
 SIDE_SHARES = (0.7, 0.35)  # of the prior quantiles from neutral to an end: where effects are tried
 LOOK = "look"  # phase of the first runs of effects where they seem to fit best
 SECOND_EFFECT_GAIN = 6.0  # log likelihood that a second effect must gain
+CLEAN_PASSES = 2  # of runs where the model fits clean data best: so far, and with the first's runs
+CLEAN_RUNS = 2  # of each; the mean of the last is free of the emulator's error
 
 
 class Base(NamedTuple):
-    """The base model and what the effects would do to it."""
+    """The base model and what the effects would do to it.
+
+    Attributes:
+        hypothesis, check: The fitted model and its test.
+        null: Residuals of a right model [m, n].
+        signatures, singles: Of each effect that could be simulated: what it changes, and the model
+            in which it acts.
+        untested: Effects of which too few simulations succeeded, and the first one's error.
+        inert: Effects that changed no signal, as if the simulator did not read their coefficients.
+        box: In which effects were simulated.
+        runs: All of them.
+    """
 
     hypothesis: Hypothesis
     check: Check
-    null: np.ndarray  # [m, n], residuals of a right model
+    null: np.ndarray
     signatures: dict[str, Signature]
     singles: dict[str, Hypothesis]
-    box: PriorBox  # in which effects were simulated
+    untested: dict[str, str]
+    inert: tuple[str, ...]
+    box: PriorBox
     runs: Runs
 
 
 def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, PriorBox]:
     """Fit the base model near its optimum. Return the fit, its runs and the box of the first."""
-    whole = everywhere(len(study.prior))
+    whole = PriorBox.whole(len(study.prior))
     start = study.points(whole, (), study.plan.start)
     runs = study.run("start", start) if earlier is None else earlier
     fitted = study.hypothesis((), runs, whole)
-    box = first = around(fitted.u, fitted.sd, FIRST_HALF_WIDTH)
+    box = first = PriorBox.around(fitted.u, fitted.sd, FIRST_HALF_WIDTH)
     for attempt in range(BASE_PASSES):
         made = study.run(f"base {attempt}", study.points(box, (), study.plan.base))
         runs = joined([runs, made])
         before, fitted = fitted, study.hypothesis((), runs, whole)
         if settled(0.5 * (before.misfit(fitted) - fitted.misfit(fitted)), fitted, box):
             break
-        box = around(fitted.u, fitted.sd, LATER_HALF_WIDTH)
+        box = PriorBox.around(fitted.u, fitted.sd, LATER_HALF_WIDTH)
     return fitted, runs, first
 
 
@@ -67,36 +74,43 @@ def settled(gained: float, fitted: Hypothesis, box: PriorBox) -> bool:
     return abs(gained) <= TIE_MARGIN and doubt <= MAX_DOUBT and box.encloses(fitted.u)
 
 
-def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
+def examine(study: Study, earlier: Runs | None) -> Base:
     """Fit the base model, learn every effect's signature, and test the model.
 
     The effects act where the base model fits best, with the same seeds: so what runs differ by
     is their doing.
-
-    Returns:
-        What was found, and the effects of which too few simulations succeeded to learn from.
     """
     base, runs, box = fit_base(study, earlier)
-    neutral, known = _screen(study, base.best)
-    runs = joined([runs, *neutral])
+    tried = _screen(study, base.best)
+    neutral = tried.pop("")
+    known = {name: of for name, of in tried.items() if len(of) >= MIN_EFFECT_RUNS}
+    runs = joined([runs, neutral])
     base = study.hypothesis((), runs, base.within)
-    within = with_whole_priors(box, 1)
+    within = box.extended(1)
     singles = {
-        name: study.hypothesis((name,), joined([runs, *of]), within) for name, of in known.items()
+        name: study.hypothesis((name,), joined([runs, of]), within) for name, of in known.items()
     }
     signatures = {
         name: signature(base, single, study.extensions[name]) for name, single in singles.items()
     }
     signatures = scored_on_clean(base, study.experiment.noise, signatures)
     tested, null = study.check(base, signatures)
-    every = joined([runs, *sum(known.values(), [])])
-    found = Base(base, tested, null, signatures, singles, box, every)
-    return found, tuple(name for name in study.extensions if name not in known)
+    return Base(
+        hypothesis=base,
+        check=tested,
+        null=null,
+        signatures=signatures,
+        singles=singles,
+        untested={name: of.error for name, of in tried.items() if name not in known},
+        inert=tuple(name for name, of in known.items() if _equal(of, neutral)),
+        box=box,
+        runs=joined([runs, *known.values()]),
+    )
 
 
-def _screen(study: Study, best: Mapping[str, float]) -> tuple[list[Runs], dict[str, list[Runs]]]:
-    """Runs of the base model at its best parameters, and beside them of each effect of which at
-    least two succeed; where some fail, others are made nearer to neutral."""
+def _screen(study: Study, best: Mapping[str, float]) -> dict[str, Runs]:
+    """Runs at the base model's best parameters, of each effect and, under "", of none; where some
+    fail, others are made nearer to neutral."""
     count = study.plan.extension
     at_best = {name: np.full(count, value) for name, value in best.items()}
     found: dict[str, list[Runs]] = {name: [] for name in ("", *study.extensions)}
@@ -111,8 +125,59 @@ def _screen(study: Study, best: Mapping[str, float]) -> tuple[list[Runs], dict[s
         made = study.run_each(f"effects {attempt}", asked)
         for name, runs in zip(lacking, made, strict=True):
             found[name].append(runs)
-    neutral = found.pop("")
-    return neutral, {name: of for name, of in found.items() if sum(map(len, of)) >= MIN_EFFECT_RUNS}
+    return {name: joined(of) for name, of in found.items()}
+
+
+def _equal(one: Runs, other: Runs) -> bool:
+    """Whether runs have the signals that others have of the same seeds."""
+    signals = dict(zip(other.seeds.tolist(), other.signals, strict=True))
+    pairs = zip(one.seeds.tolist(), one.signals, strict=True)
+    return all(seed in signals and np.array_equal(signals[seed], signal) for seed, signal in pairs)
+
+
+class OwnResidual(NamedTuple):
+    """Residual of the base model on clean data, and where the model leaves it.
+
+    Attributes:
+        residual: Observed less the model's expectation [*signal_shape], NaN where missing.
+        best: The most probable parameters.
+    """
+
+    residual: np.ndarray
+    best: dict[str, float]
+
+
+def own_residual(
+    experiment: Experiment,
+    prior: Prior,
+    extensions: Extensions,
+    compute: Compute,
+    *,
+    report: Report = silent,
+    start: int = Plan.start,
+) -> OwnResidual:
+    """Residual of the calibrated base model on data in which no effect is expected.
+
+    Args:
+        compute: Where runs are made and kept.
+        report: Called with the phase and the number of simulations finished in it.
+        start: Runs all over the prior, before those where the model fits best.
+
+    Raises:
+        RuntimeError: every simulation failed, or the executor lost its workers.
+    """
+    study = Study(experiment, prior, extensions, compute, Plan(start=start), report=report)
+    whole = PriorBox.whole(len(prior))
+    runs = [study.run("start", study.points(whole, (), start))]
+    fits = [study.hypothesis((), runs[0], whole)]
+    for attempt in range(CLEAN_PASSES):
+        at_best = {name: np.full(CLEAN_RUNS, value) for name, value in fits[-1].best.items()}
+        runs.append(study.run(f"best {attempt}", at_best))
+        fits.append(study.hypothesis((), joined(runs), whole))
+    before, fitted = fits[-2:]
+    now, then = fitted.expected(np.stack([fitted.u, before.u]))
+    moved = fitted.surrogate.output.restore((now - then)[None])[0]
+    return OwnResidual(experiment.observed - runs[-1].signals.mean(0) - moved, fitted.best)
 
 
 def explain(
@@ -131,12 +196,12 @@ def explain(
     """
     plan = study.plan
     forced = tuple(accept or ())
-    unknown = [name for name in forced if name not in base.singles]
-    if unknown:
-        raise AllRunsFailed(
-            f"{', '.join(unknown)} cannot be accepted: of its simulations fewer than "
-            f"{MIN_EFFECT_RUNS} succeeded; mend the simulator, or accept another effect"
-        )
+    for name in forced:
+        if name in base.untested:
+            raise AllRunsFailed(
+                f"{name} cannot be accepted: {base.untested[name]}; mend the simulator, or accept "
+                "another effect"
+            )
     search = Search(study, base)
     near = near_best(search.singles, 2 * plan.refits)
     if plan.look and len(near) > plan.refits:  # else all of them are refitted
@@ -187,7 +252,7 @@ class Search:
             near = one.refitted or phase != LOOK
             near = near and fitted.within.encloses(fitted.u)
             least = LATER_HALF_WIDTH if near else FIRST_HALF_WIDTH
-            boxes[one.names] = around(fitted.u, fitted.sd, least)
+            boxes[one.names] = PriorBox.around(fitted.u, fitted.sd, least)
         left = study.plan.most - (len(self.runs) - self.counted)
         if self.limited:
             boxes = dict(list(boxes.items())[: max(left // count, 0)])
@@ -197,7 +262,7 @@ class Search:
         self.runs = joined([self.runs, *made.values()])
         for one in candidates:
             if one.names in boxes:
-                within = hull(one.hypothesis.within, boxes[one.names])
+                within = one.hypothesis.within.hull(boxes[one.names])
                 fitted = study.hypothesis(one.names, self.runs, within)
                 self.found[one.names] = self.candidate(fitted, one.refitted)
         return boxes
@@ -236,9 +301,8 @@ class Search:
         box = self.base.box
         for name in names:
             within = self.found[(name,)].hypothesis.within
-            box = hull(box, PriorBox(*(end[: len(box.low)] for end in within)))
-        within = with_whole_priors(box, len(names))
-        return self.candidate(self.study.hypothesis(names, self.runs, within))
+            box = box.hull(PriorBox(*(end[: len(box.low)] for end in within)))
+        return self.candidate(self.study.hypothesis(names, self.runs, box.extended(len(names))))
 
     def try_pairs(self) -> None:
         """Fit the best effect with those that its residual seems to need most; a pair counts if

@@ -8,17 +8,15 @@ import numpy as np
 
 from ..arguments import checked_integer
 from ..prior import Prior
+from ..simulations.bank import Simulation
 from ..simulations.compute import Compute
-from ..simulations.failures import NoSignals
+from ..simulations.failures import NoSignals, unusable
 from ..simulations.job import jobs, succeeded
 from ..simulations.runner import run_missing
-from .experiment import Experiment, Proposal
+from .experiment import Experiment, Extensions, Proposal, extended
 from .hypothesis import Hypothesis, hypothesise
-from .misfit import Check, check, null_draws
-from .model_extension import Extensions, extended
-from .prior_boxes import PriorBox, fill
-from .runs import Runs
-from .signatures import Signature
+from .misfit import Check, Signature, check, null_draws
+from .runs import PriorBox, Runs
 
 MIN_EFFECT_RUNS = 2
 
@@ -110,7 +108,7 @@ class Study:
         thetas: Sequence[Mapping[str, np.ndarray]],
         elsewhere: Experiment | Proposal | None = None,
     ) -> list[Runs]:
-        """The same at several theta in one call; the k-th run of each has the same seed.
+        """Simulate at several theta in one call; the k-th run of each has the same seed.
 
         So what they differ by is not chance. Where all runs at a theta fail, there are none of it.
 
@@ -136,27 +134,25 @@ class Study:
         except NoSignals as error:
             if len(thetas) > 1:  # those of others may return some
                 return [self.run_each(phase, [theta], elsewhere)[0] for theta in thetas]
-            why = f"no simulation of the phase {phase!r} returned a signal: {error}"
-            return [self._none(thetas[0], made_for.shape, why)]
+            results = [Simulation(None, unusable(str(error)), 0.0) for _ in asked[0]]
         runs = []
         for theta, batch in zip(thetas, asked, strict=True):
             own, results = results[: len(batch)], results[len(batch) :]
             good = succeeded(own)
-            if good:
-                rows = list(good)
-                at = {name: np.asarray(column, float)[rows] for name, column in theta.items()}
-                runs.append(self.table(at, np.stack(list(good.values())), seeds[rows]))
-                continue
-            why = (
-                f"all {len(own)} simulations of the phase {phase!r} failed, the first at "
-                f"{batch[0].theta}: {own[0].error or 'its output is not finite'}"
-            )
-            runs.append(self._none(theta, made_for.shape, why))
+            rows = np.array(list(good), int)
+            errors = [
+                f"at {job.theta}: {one.error or 'its output is not finite'}"
+                for k, (job, one) in enumerate(zip(batch, own, strict=True))
+                if k not in good
+            ]
+            error = ""
+            if errors:
+                failed = f"{len(errors)} of {len(batch)} simulations of the phase {phase!r} failed"
+                error = f"{failed}, the first {errors[0]}"
+            at = {name: np.asarray(column, float)[rows] for name, column in theta.items()}
+            signals = np.reshape(list(good.values()), (len(rows), *made_for.shape))
+            runs.append(self.table(at, signals, seeds[rows], error))
         return runs
-
-    def _none(self, theta: Mapping[str, np.ndarray], shape: tuple[int, ...], error: str) -> Runs:
-        nowhere = {name: np.zeros(0) for name in theta}
-        return self.table(nowhere, np.zeros((0, *shape)), np.zeros(0, np.int64), error)
 
     def table(
         self,
@@ -178,7 +174,7 @@ class Study:
 
     def points(self, box: PriorBox, names: tuple[str, ...], count: int) -> dict[str, np.ndarray]:
         """Parameters all over a box, name -> [count]."""
-        return fill(box, extended(self.prior, self.extensions, names), self.seed, count)
+        return box.fill(extended(self.prior, self.extensions, names), self.seed, count)
 
     def check(
         self, hypothesis: Hypothesis, signatures: Mapping[str, Signature]

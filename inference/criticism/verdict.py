@@ -1,4 +1,4 @@
-"""What is concluded from the tests of a model and of its extensions."""
+"""Conclusions from the tests of a model and of its extensions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

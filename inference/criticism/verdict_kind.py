@@ -13,7 +13,7 @@ class VerdictKind(StrEnum):
 
     @property
     def advice(self) -> str:
-        """What it means and what to do next."""
+        """Its meaning, and what to do next."""
         return _ADVICE[self]
 
 

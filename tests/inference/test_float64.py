@@ -85,11 +85,12 @@ def test_threads_that_leave_in_another_order_leave_blas_as_it_was():
 def test_the_number_of_blas_threads_changes_no_bit():
     rng = np.random.default_rng(0)
     clean = [np.cumsum(rng.normal(size=(300, 1)), axis=0) for _ in range(3)]
-    silent, at = [criticism.KnownNoise(0.1)] * 3, samples(np.zeros(300))
+    clean = [criticism.CleanData(one, criticism.KnownNoise(0.1)) for one in clean]
+    at = samples(np.zeros(300))
     found = []
     for threads in (1, 2, 4):
         with threadpool_limits(threads, "blas"):
-            found.append(criticism.usual_residual(clean, silent, [True] * 3).covariance(at))
+            found.append(criticism.learned_model_error(clean).covariance(at))
     for other in found[1:]:
         np.testing.assert_array_equal(other, found[0])
 
@@ -117,7 +118,7 @@ def counted(monkeypatch):
 
         return call
 
-    assert criticism.criticise and criticism.usual_residual  # their modules are loaded lazily
+    assert criticism.criticise and criticism.learned_model_error  # their modules are loaded lazily
     places = [m for name, m in sys.modules.items() if name.startswith("bolfi_liquids.inference")]
     for place in (np.linalg, *places):
         for name in LAPACK:

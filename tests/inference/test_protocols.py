@@ -84,13 +84,15 @@ def noises():
     white = inference.criticism.KnownNoise(0.3)
     correlated = inference.criticism.AutoregressiveNoise(np.array([0.5]), np.array([0.8]))
     residual = np.random.default_rng(0).normal(0.0, 1.0, (8, 2))
-    usual = inference.criticism.usual_residual([residual], [white], [True])
+    error = inference.criticism.learned_model_error(
+        [inference.criticism.CleanData(residual, white)]
+    )
     return {
         inference.criticism.KnownNoise: white,
         inference.criticism.AutoregressiveNoise: correlated,
         inference.criticism.SumOfNoises: inference.criticism.SumOfNoises((white, correlated)),
         # of a size known well: draws of one known badly have no variance to judge them by
-        inference.criticism.UsualResidual: replace(usual, freedom=1000),
+        inference.criticism.ModelError: replace(error, freedom=1000),
     }
 
 

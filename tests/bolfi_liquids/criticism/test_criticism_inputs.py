@@ -225,7 +225,7 @@ def test_clean_recordings_of_the_same_path_say_where_it_errs(stirred):
     assert [one.same for one in elsewhere.clean] == [False]
     cameras = camera_noise([recording])
     noise = stir_experiment(stirring, cameras, same, "stir").noise
-    assert [type(part).__name__ for part in noise.parts] == ["AutoregressiveNoise", "UsualResidual"]
+    assert [type(part).__name__ for part in noise.parts] == ["AutoregressiveNoise", "ModelError"]
     assert usual_for(stirring, [], 0.5) is None
     assert stir_experiment(stirring, cameras, None, "stir").noise is cameras
 

@@ -7,12 +7,12 @@ import errno
 import resource
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 import numpy as np
 import pytest
+from bolfi_liquids.inference.checks.many_replicates import ReplicateStore
 from bolfi_liquids.inference.checks.one_replicate import Replicate
-from bolfi_liquids.inference.checks.store import ReplicateStore
 from bolfi_liquids.inference.simulations import Simulation
 from xarray import Dataset, DataTree
 
@@ -72,7 +72,7 @@ def bank(folder):
 
 def replicates(folder):
     data = np.random.default_rng(0).random(9999)
-    with ReplicateStore(folder / "kept.sqlite", {"a": "b"}) as store, at_most(200_000):
+    with closing(ReplicateStore(folder / "kept.sqlite", {"a": "b"})) as store, at_most(200_000):
         for n in range(99):
             store.put(Replicate(n, data[:1], data, data[:, None], None, 1.0, 1.0, None))
 

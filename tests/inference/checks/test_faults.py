@@ -52,10 +52,11 @@ def posterior_density(toys):
     return lambda theta, observed: toys.LinePosterior().log_density(observed)(theta)
 
 
-@pytest.mark.parametrize("name", CHECKS)
-def test_the_exact_posterior_passes(exact, name):
-    result = CHECKS[name](exact, alpha=ALPHA)
-    assert result.ok, str(result)
+def test_the_exact_posterior_passes(exact):
+    failed = [
+        str(result) for check in CHECKS.values() if not (result := check(exact, alpha=ALPHA)).ok
+    ]
+    assert failed == []
 
 
 @pytest.mark.slow
@@ -123,9 +124,9 @@ def test_autocorrelated_draws_are_caught_where_they_are_not_thinned(run):
 
 
 def test_thinning_repairs_autocorrelated_draws(run):
-    """600 draws of correlation 0.9 are worth 32: enough for 15."""
+    """800 draws of correlation 0.9 are worth 42: enough for 15."""
     chains = {"correlation": 0.9, "shape": (2, 400), "draws": 15}
-    made = run(independent=False, **chains)
+    made = run(n=128, independent=False, **chains)
     assert np.median(made.count) == 15
     for name, check in CHECKS.items():
         p_values = {

@@ -69,9 +69,9 @@ class Guess:
         return {"a": rng.normal(observed.mean(), 1.0, self.n), "b": rng.random(self.n)}
 
 
-def run(pipeline=None, n=12, **options):
-    options = {"draws": 15, "independent": True} | options
-    return inference.replicates(pipeline or Guess(), simulate, PRIOR, n, **options)
+def run(pipeline=None, n=12, simulate=simulate, prior=PRIOR, **options):
+    options = {"draws": 15, "independent": True, "progress": False} | options
+    return inference.replicates(pipeline or Guess(), simulate, prior, n, **options)
 
 
 def test_truths_come_from_the_prior_and_data_from_the_truths():
@@ -137,32 +137,26 @@ def test_killed_and_repeated_equals_undisturbed(tmp_path, monkeypatch):
     np.testing.assert_array_equal(killed, undisturbed)
 
 
-@pytest.mark.parametrize(
-    ("changed", "named"),
-    [
+def test_a_store_refuses_other_settings_and_welcomes_more_replicates(tmp_path):
+    store = tmp_path / "r.sqlite"
+    first = run(n=2, store=store, timeout=60.0)
+    for changed, named in (
         ({"seed": 1}, "seed"),
         ({"draws": 7}, "draws"),
         ({"independent": False}, "independent"),
         ({"pipeline": Guess(n=20)}, "pipeline"),
         ({"identity": "new code"}, "identity"),
         ({"observe": lambda signal, rng: signal}, "observe"),
-    ],
-)
-def test_a_store_refuses_other_settings(tmp_path, changed, named):
-    store = tmp_path / "r.sqlite"
-    run(n=2, store=store)
-    with pytest.raises(ValueError, match=rf"other settings .*\({named}: stored"):
-        run(n=2, store=store, **changed)
-    assert len(run(n=4, store=store)) == 4  # more of the same are welcome
-
-
-def test_a_store_knows_its_prior(tmp_path):
-    run(n=2, store=tmp_path / "r.sqlite")
-    wider = inference.Prior({"a": dist.Normal(0.0, 2.0), "b": dist.Uniform(0.0, 1.0)})
-    with pytest.raises(ValueError, match="prior: stored"):
-        inference.replicates(
-            *(Guess(), simulate, wider, 2), draws=15, independent=True, store=tmp_path / "r.sqlite"
-        )
+        (
+            {"prior": inference.Prior({"a": dist.Normal(0.0, 2.0), "b": dist.Uniform(0.0, 1.0)})},
+            "prior",
+        ),
+    ):
+        with pytest.raises(ValueError, match=rf"other settings .*\({named}: stored"):
+            run(n=2, store=store, **changed)
+    again = run(n=4, store=store)  # of another time limit, which decides no draw
+    assert len(again) == 4
+    np.testing.assert_array_equal(again.draws[:2], first.draws)
 
 
 def test_other_files_are_refused_and_left_alone(tmp_path):
@@ -184,6 +178,8 @@ def test_failures_are_kept_counted_and_tried_again_on_request(tmp_path):
     (said,) = set(first.errors.values())
     assert said.startswith("pipeline: ArithmeticError: too high")
     assert f"{len(first.failed)} of 40 replicates failed" in inference.sbc(first).warnings[0]
+    few = run(Guess(fails_above=3.0), n=200)  # too few to hide a fault
+    assert 0 < len(few.failed) < 7 and few.warnings == []
     connection = sqlite3.connect(store)
     connection.execute("UPDATE replicate SET error = 'disk full' WHERE error IS NOT NULL")
     connection.commit()
@@ -192,19 +188,13 @@ def test_failures_are_kept_counted_and_tried_again_on_request(tmp_path):
     assert run(Guess(0.5), n=40, store=store, retry=True).errors == first.errors
 
 
-def test_a_few_failures_are_shown_but_do_not_condemn():
-    made = run(Guess(fails_above=3.0), n=200)
-    assert 0 < len(made.failed) < 7
-    assert made.warnings == [] and f"{len(made.failed)} more failed" in str(inference.sbc(made))
-
-
 def test_a_simulator_that_fails_is_not_the_pipelines_fault():
     def broken(theta, seeds):
         if theta["a"][0] > 0:
             raise OSError("no disk")
         return np.full((1, 4), np.nan)
 
-    made = inference.replicates(Guess(), broken, PRIOR, 20)
+    made = run(n=20, simulate=broken)
     assert {one.stage for one in made.failed} == {"simulator"}
     assert {one.error.kind for one in made.failed} == {FailureKind.RAISED, FailureKind.NOT_FINITE}
     assert any("OSError: no disk" in said for said in made.errors.values())
@@ -218,9 +208,9 @@ def test_replicates_beside_unusable_ones_are_kept_and_these_are_tried_again(tmp_
         return np.zeros(()) if theta["a"][0] > 0.5 else simulate(theta, seeds)
 
     def made(told):
-        how = {"draws": 15, "independent": True, "store": tmp_path / "r.sqlite"}
-        given = Guess(), at_times_no_signal, PRIOR, 30
-        return inference.replicates(*given, progress=told.append, **how)
+        return run(
+            n=30, simulate=at_times_no_signal, progress=told.append, store=tmp_path / "r.sqlite"
+        )
 
     ran, ran_again = [], []
     first, again = made(ran), made(ran_again)
@@ -232,22 +222,14 @@ def test_replicates_beside_unusable_ones_are_kept_and_these_are_tried_again(tmp_
 
 def test_a_simulator_that_takes_too_long_costs_its_replicate():
     def slow(theta, seeds):
-        time.sleep(0.5 * (theta["a"][0] > 0))
+        time.sleep(0.2 * (theta["a"][0] > 0))
         return simulate(theta, seeds)
 
-    options = {"draws": 15, "independent": True}
-    made = inference.replicates(Guess(), slow, PRIOR, 12, timeout=0.1, **options)
-    plain = inference.replicates(Guess(), simulate, PRIOR, 12, **options)
+    made, plain = run(simulate=slow, timeout=0.1), run()
     late = plain.truth[:, 0] > 0
     assert set(made.errors) == set(np.flatnonzero(late)) and len(made) == (~late).sum()
     assert {one.error.kind for one in made.failed} == {FailureKind.TIMEOUT}
     np.testing.assert_array_equal(made.draws, plain.draws[~late])
-
-
-def test_more_time_is_no_other_setting(tmp_path):
-    store = tmp_path / "r.sqlite"
-    first = run(n=4, store=store, timeout=60.0)
-    np.testing.assert_array_equal(run(n=4, store=store).draws, first.draws)
 
 
 def test_progress_is_told_of_every_replicate(capsys):
@@ -263,29 +245,20 @@ def test_draws_that_are_not_finite_are_a_failure():
     }
 
 
-@pytest.mark.parametrize(
-    ("pipeline", "said"),
-    [
-        (lambda observed, seed: {"a": np.zeros(9)}, "must hold the parameters"),
-        (lambda observed, seed: np.zeros(9), "name -> draws"),
-    ],
-)
-def test_a_pipeline_of_the_wrong_form_stops_the_run(pipeline, said):
-    with pytest.raises(ValueError, match=said):
-        run(pipeline)
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ({"n": 0}, "n must be"),
-        ({"draws": 0}, "draws must be"),
-        ({"seed": -1}, "seed must be"),
-        ({"timeout": 0}, "timeout must be"),
-    ],
-)
-def test_arguments_are_checked(options, said):
-    with pytest.raises(ValueError, match=said):
-        run(**options)
-    with pytest.raises(ValueError, match="simulate is needed"):
-        inference.replicates(Guess())
+def test_what_would_fail_for_every_replicate_stops_the_run():
+    """A pipeline of the wrong form, and arguments that make no sense."""
+    for wrong, named in (
+        ({"pipeline": lambda observed, seed: {"a": np.zeros(9)}}, "parameters"),
+        ({"pipeline": lambda observed, seed: np.zeros(9)}, "draws"),
+        ({"n": 0}, "n must"),
+        ({"draws": 0}, "draws"),
+        ({"seed": -1}, "seed"),
+        ({"timeout": 0}, "timeout"),
+        ({"executor": 3}, "executor"),
+        ({"observe": 3}, "observe"),
+        ({"simulate": 3}, "simulate"),
+        ({"simulate": None}, "simulate is needed"),
+        ({"prior": None}, "prior is needed"),
+    ):
+        with pytest.raises(ValueError, match=named):
+            run(**wrong)

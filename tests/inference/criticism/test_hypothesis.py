@@ -1,22 +1,24 @@
-"""What an emulator that is coarse adds to a misfit, and where windows of an output lie."""
+"""Where models are simulated and fitted, what a coarse emulator adds, and where windows lie."""
 
 import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference import criticism
-from bolfi_liquids.inference.criticism.hypothesis import hypothesise, values_of
+from bolfi_liquids.inference.criticism.hypothesis import (
+    hypothesise,
+    values_of,
+    weighted_posterior,
+)
 from bolfi_liquids.inference.criticism.measurement_noise import samples
 from bolfi_liquids.inference.criticism.misfit import locate, null_draws
-from bolfi_liquids.inference.criticism.posterior import weighted_posterior
-from bolfi_liquids.inference.criticism.prior_boxes import everywhere, fill
+from bolfi_liquids.inference.criticism.runs import PriorBox, sides
+from bolfi_liquids.inference.criticism.search import examine, explain
 from bolfi_liquids.inference.criticism.study import Study
 from bolfi_liquids.inference.simulations import Compute
 from bolfi_liquids.inference.surrogates import output_vectors
 from scipy.stats import binom, chi2, norm
 
 from bolfi_liquids import inference
-
-pytestmark = pytest.mark.slow
 
 ALPHA = 1e-4  # false alarms per test
 EMULATORS, RUNS = 20, 8
@@ -35,8 +37,8 @@ def oscillate(theta, seeds):
 def fitted(simulate, observed, noise, bank, count=RUNS):
     experiment = criticism.Experiment(simulate, observed, noise)
     study = Study(experiment, PRIOR, EXTENSIONS, Compute(batch=64), seed=bank)
-    runs = study.run("start", fill(everywhere(1), PRIOR, bank, count))
-    return hypothesise((), PRIOR, runs, observed, noise, everywhere(1))
+    runs = study.run("start", PriorBox.whole(1).fill(PRIOR, bank, count))
+    return hypothesise((), PRIOR, runs, observed, noise, PriorBox.whole(1))
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +65,7 @@ def alarms(hypotheses, spread):
     return count
 
 
+@pytest.mark.slow
 def test_a_coarse_emulators_error_is_reckoned_with(coarse):
     """Without it a right model would be refused in half of all cases."""
     limit = binom.isf(ALPHA, EMULATORS, LEVEL)
@@ -70,6 +73,7 @@ def test_a_coarse_emulators_error_is_reckoned_with(coarse):
     assert alarms(coarse, spread=False) > limit
 
 
+@pytest.mark.slow
 def test_a_run_that_blew_up_is_left_out():
     def seldom(theta, seeds):
         signals = oscillate(theta, seeds)
@@ -115,6 +119,7 @@ def averaged():
         return fitted(tilted, observed, noise, 0, count=16), noise
 
 
+@pytest.mark.slow
 def test_noise_is_averaged_like_the_output(averaged):
     """A draw's place in the flattened output is not that of its value."""
     hypothesis, noise = averaged
@@ -128,6 +133,7 @@ def test_noise_is_averaged_like_the_output(averaged):
     np.testing.assert_allclose(drawn.var(0), expected, rtol=error)
 
 
+@pytest.mark.slow
 def test_windows_of_averaged_values_and_of_single_samples_are_looked_at(averaged):
     hypothesis, noise = averaged
     null = null_draws(hypothesis, noise, np.random.default_rng(0))
@@ -140,6 +146,7 @@ def test_windows_of_averaged_values_and_of_single_samples_are_looked_at(averaged
     assert single.rms == pytest.approx(0.5, abs=error / np.sqrt(3))
 
 
+@pytest.mark.slow
 def test_the_mean_of_a_window_is_over_all_its_channels(averaged):
     """The first channel alone is where it should be."""
     hypothesis, noise = averaged
@@ -160,23 +167,97 @@ def level(theta, seeds):
     return np.tile(theta["level"][:, None], (1, 30))
 
 
-@pytest.mark.parametrize("size", [1.0, 4.0], ids=["as large as usual", "four times as large"])
-def test_a_posterior_allows_for_what_is_not_known_of_the_usual_residuals_size(size):
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [1.0, 4.0], ids=["as large as learned", "four times as large"])
+def test_a_posterior_allows_for_what_is_not_known_of_the_model_errors_size(size):
     """White residuals whose variance is known as from 3 numbers: the level's posterior is Student's
     t, and as wide as the residuals that are seen."""
     rng, n, sd, freedom = np.random.default_rng(0), 30, 0.05, 3
     prior = inference.Prior({"level": dist.Uniform(-2.0, 2.0)})
-    usual = criticism.UsualResidual(np.append(sd**2, np.zeros(n - 1)), freedom)
+    usual = criticism.ModelError(np.append(sd**2, np.zeros(n - 1)), freedom)
     noise = criticism.SumOfNoises((criticism.KnownNoise(1e-4), usual))
     observed = 0.3 + size * sd * rng.normal(size=n)
     experiment = criticism.Experiment(level, observed, noise)
     runs = Study(experiment, prior, EXTENSIONS, Compute(batch=64)).run(
-        "start", fill(everywhere(1), prior, 0, 12)
+        "start", PriorBox.whole(1).fill(prior, 0, 12)
     )
-    found = weighted_posterior(hypothesise((), prior, runs, observed, noise, everywhere(1)))
+    found = weighted_posterior(hypothesise((), prior, runs, observed, noise, PriorBox.whole(1)))
     draws, weights = found.theta["level"], found.weights
     spread = np.sqrt(np.average((draws - np.average(draws, weights=weights)) ** 2, weights=weights))
     squares = freedom * sd**2 + np.sum((observed - observed.mean()) ** 2)
     expected = np.sqrt(squares / (freedom + n - 3) / n)
     assert spread == pytest.approx(expected, rel=0.1)
     assert np.average(draws, weights=weights) == pytest.approx(observed.mean(), abs=0.1 * expected)
+
+
+# Where a model is simulated.
+
+RISE = np.linspace(0.0, 1.0, 40)
+LEVEL_PRIOR = inference.Prior({"level": dist.Uniform(-2.0, 2.0)})
+RAMPS = {"ramp": criticism.Extension(dist.Uniform(-2.0, 2.0))}
+QUIET = criticism.KnownNoise(0.02)
+
+
+def ramp(theta, seeds):
+    """An effect that a model without it takes for another level."""
+    size = theta.get("ramp", np.zeros(len(seeds)))
+    return theta["level"][:, None] + size[:, None] * (1.0 + 0.5 * RISE**2)
+
+
+def study_of(data):
+    experiment = criticism.Experiment(ramp, data, QUIET)
+    return Study(experiment, LEVEL_PRIOR, RAMPS, Compute(batch=64))
+
+
+def ramped(level, size=0.0):
+    theta = {"level": np.array([level]), "ramp": np.array([size])}
+    return ramp(theta, [0])[0] + 0.02 * np.random.default_rng(0).normal(size=len(RISE))
+
+
+def test_a_point_at_a_wall_is_not_enclosed_unless_the_prior_ends_there():
+    box = PriorBox(np.array([0.0, 0.2]), np.array([0.5, 1.0]))
+    inside = [0.0, 0.6], [0.25, 1.0], [0.4, 0.9]
+    outside = [0.499, 0.6], [0.25, 0.201], [0.6, 0.6], [0.25, 0.1]
+    assert all(box.encloses(np.array(u)) for u in inside)
+    assert not any(box.encloses(np.array(u)) for u in outside)
+
+
+def test_a_hull_holds_both_boxes_and_an_intersection_is_in_both():
+    one, other = PriorBox(np.zeros(2), np.full(2, 0.5)), PriorBox(np.array([0.2, 0.4]), np.ones(2))
+    np.testing.assert_array_equal(one.hull(other), [[0.0, 0.0], [1.0, 1.0]])
+    np.testing.assert_array_equal(one.intersection(other), [[0.2, 0.4], [0.5, 0.5]])
+
+
+def test_effects_are_tried_on_both_sides_of_neutral_or_on_the_only_one():
+    for low, high, expected in (
+        (-1.0, 1.0, [-0.6, 0.6, -0.3, 0.3]),
+        (0.0, 1.0, [0.6, 0.3, 0.2, 0.15]),
+        (-1.0, 0.0, [-0.6, -0.3, -0.2, -0.15]),
+        (-1.0, 3.0, [-0.6, 1.8, -0.3, 0.9]),
+    ):
+        found = sides(criticism.Extension(dist.Uniform(low, high)), 4, 0.6)
+        np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_best_fit_and_posterior_stay_where_the_model_was_simulated():
+    """Data that lie beyond draw both to the end and no further."""
+    within = PriorBox(np.array([0.2]), np.array([0.5]))
+    study = study_of(ramped(1.5))
+    runs = study.run("start", within.fill(LEVEL_PRIOR, 0, 12))
+    found = study.hypothesis((), runs, within)
+    assert found.u[0] == pytest.approx(0.5, abs=0.01)
+    level = weighted_posterior(found).draw(0, 200)["level"]
+    assert level.max() < 4.0 * 0.55 - 2.0
+
+
+@pytest.mark.slow
+def test_a_truth_outside_of_the_box_of_the_model_without_the_effect_is_reached():
+    """The base model fits best at 1.6, half of the prior's range away."""
+    study = study_of(ramped(0.0, 1.4))
+    base = examine(study, None)
+    assert not base.box.encloses(np.array([0.5]))
+    _, accepted = explain(study, base)
+    (one,) = accepted
+    assert one.hypothesis.best == pytest.approx({"level": 0.0, "ramp": 1.4}, abs=0.1)
+    assert one.hypothesis.within.encloses(one.hypothesis.u)

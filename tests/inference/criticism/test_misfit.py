@@ -1,18 +1,16 @@
 """The tests of a model against data, on a simulator that is linear and Gaussian."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference import criticism
-from bolfi_liquids.inference._float64 import in_float64
-from bolfi_liquids.inference.criticism.measurement_noise import gaussian, samples
-from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws
+from bolfi_liquids.inference.criticism.measurement_noise import samples
+from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws, scored_on_clean
 from bolfi_liquids.inference.criticism.search import examine
-from bolfi_liquids.inference.criticism.signatures import scored_on_clean
 from bolfi_liquids.inference.criticism.study import Study
-from bolfi_liquids.inference.criticism.usual_residual import REPEATED
 from bolfi_liquids.inference.simulations import Compute
 from scipy.stats import binom, kstest, norm
 
@@ -22,7 +20,6 @@ pytestmark = pytest.mark.slow
 
 ALPHA = 1e-4  # false alarms per test
 BANKS, SETS = 5, 30  # emulators, and data sets for each
-REPEATING = 40  # data sets for each, whose errors repeat
 LEVEL = 0.05
 
 N = 96  # values
@@ -40,6 +37,13 @@ WINDOWS = [
     criticism.Window({"start": start}, (STEPS >= start) & (STEPS < start + 16))
     for start in range(0, N, 16)
 ]
+
+
+def learned(residuals, noises, same, distances=None):
+    """The model error that these clean data teach."""
+    far = np.zeros(len(residuals)) if distances is None else distances
+    given = zip(residuals, noises, same, far, strict=True)
+    return criticism.learned_model_error([criticism.CleanData(*one) for one in given])
 
 
 def exact(theta, seeds):
@@ -62,7 +66,7 @@ def observe(simulate, number, bump=0.0):
 
 def examined(simulate, observed, bank):
     experiment = criticism.Experiment(simulate, observed, NOISE)
-    return examine(Study(experiment, PRIOR, EXTENSIONS, Compute(batch=64), seed=bank), None)[0]
+    return examine(Study(experiment, PRIOR, EXTENSIONS, Compute(batch=64), seed=bank), None)
 
 
 def on(hypothesis, observed):
@@ -101,12 +105,14 @@ def nulls(banks):
     return checks(banks, NOISE)
 
 
-@pytest.mark.parametrize("kind", ["p_value", "p_score", "p_smooth"])
-def test_p_values_of_a_right_model_are_uniform(nulls, kind):
+def test_p_values_of_a_right_model_are_uniform(nulls):
     """150 of them: a distribution function off by .18 is found."""
-    p_values = [getattr(one, kind) for one in nulls]
-    assert kstest(p_values, "uniform").pvalue > ALPHA
-    assert not too_many(p_values)
+    for kind in ("p_value", "p_score", "p_smooth"):
+        p_values = [getattr(one, kind) for one in nulls]
+        assert kstest(p_values, "uniform").pvalue > ALPHA, kind
+        assert not too_many(p_values), kind
+    scores = [one.scores["bump"] for one in nulls]
+    assert kstest(scores, "norm").pvalue > ALPHA
 
 
 def test_where_no_direction_is_left_the_slow_part_alone_decides(banks):
@@ -115,11 +121,6 @@ def test_where_no_direction_is_left_the_slow_part_alone_decides(banks):
     found = check(on(base.hypothesis, observe(noisy, 7, 1.0)), {}, base.null)
     assert found.p_score == 1.0
     assert found.p_value == pytest.approx(found.p_smooth, abs=1.5e-3)  # one draw more or less
-
-
-def test_scores_of_a_right_model_are_standard_normal(nulls):
-    scores = np.array([one.scores["bump"] for one in nulls])
-    assert kstest(scores, "norm").pvalue > ALPHA
 
 
 def test_taking_correlated_noise_for_white_is_caught(banks):
@@ -158,22 +159,6 @@ def test_scores_are_those_of_generalised_least_squares():
         assert base.check.scores["bump"] == pytest.approx(expected, abs=0.02)
 
 
-def test_the_simulators_own_noise_is_known_to_be_smooth(banks):
-    """Its variance along the slowest cosines, from 40 runs, on average over the banks."""
-    modes = np.cos(np.pi * np.arange(1, 7) * (STEPS[:, None] + 0.5) / N)
-    truth = np.sum(modes * (OWN @ modes), 0)
-    ratios = np.array(
-        [np.sum(modes * (own_covariance(base.hypothesis) @ modes), 0) / truth for base in banks]
-    )
-    # 40 runs tell one variance to 22 %, the mean of 5 times 6 to 4 %
-    assert abs(ratios.mean() - 1.0) < 0.15, ratios.mean(0)
-
-
-@in_float64
-def own_covariance(hypothesis):
-    return hypothesis.spread - hypothesis.surrogate.emulator.latent_covariance(hypothesis.u)
-
-
 def located(banks, bump):
     """p-values [data sets, windows]."""
     p_values = []
@@ -197,36 +182,6 @@ def test_the_window_in_which_the_data_differ_is_found(banks):
     assert not too_many(p_values[:, [0, 1, 5]].min(1))
 
 
-@pytest.fixture(scope="module")
-def repeating(banks):
-    """Checks of right models whose errors, all along the effect's direction, repeat: scored with
-    three clean data sets, and without that."""
-    alike = np.full((4, 4), REPEATED) + (1.0 - REPEATED) * np.eye(4)
-    silent, scored, unscored = criticism.KnownNoise(0.0), [], []
-    for bank, base in enumerate(banks):
-        for number in range(REPEATING):
-            rng = np.random.default_rng([bank, number])
-            *errors, own = 0.6 * gaussian(rng, alike, 1)[0]
-            clean = [(error * BUMP)[:, None] for error in errors]
-            usual = criticism.usual_residual(clean, [silent] * 3, [True] * 3)
-            noise = criticism.SumOfNoises((NOISE, usual))
-            data = observe(noisy, 1000 * (bank + 1) + number) + own * BUMP - usual.mean(AT)
-            model = replace(on(base.hypothesis, data), noise=noise.covariance(AT))
-            null = null_draws(model, noise, rng)
-            signatures = scored_on_clean(model, noise, base.signatures)
-            scored.append(check(model, signatures, null).p_score)
-            unscored.append(check(model, base.signatures, null).p_score)
-    return np.array(scored), np.array(unscored)
-
-
-def test_an_error_that_repeats_is_less_often_taken_for_the_effect_that_it_resembles(repeating):
-    """The usual residual is stationary and the error is not: alarms are up to twice as many as they
-    should be, and more without scores on clean data."""
-    scored, unscored = repeating
-    assert np.sum(scored < LEVEL) <= binom.isf(ALPHA, len(scored), 2.0 * LEVEL)
-    assert np.sum(unscored < LEVEL) > binom.isf(ALPHA, len(scored), 2.0 * LEVEL)
-
-
 def test_clean_data_are_scored_by_what_the_others_teach(banks):
     """Against generalised least squares, which knows the design and not the emulator."""
     base = banks[0]
@@ -236,7 +191,7 @@ def test_clean_data_are_scored_by_what_the_others_teach(banks):
     scores = []
     for k in range(2):
         left, again = np.delete(clean, k, axis=0), np.delete(repeats, k)
-        taught = criticism.usual_residual(list(left), [silent] * 2, list(again))
+        taught = learned(list(left), [silent] * 2, list(again))
         unexpected = shapes[k] - taught.mean(AT)
         weight = np.linalg.inv(
             base.hypothesis.spread + NOISE.covariance(AT) + taught.covariance(AT)
@@ -247,7 +202,7 @@ def test_clean_data_are_scored_by_what_the_others_teach(banks):
         scores.append(change @ weight @ unexpected / np.sqrt(change @ weight @ change))
     size = np.sqrt((1.0 + np.sum(np.square(scores))) / 3.0)
     assert size > 1.5
-    usual = criticism.usual_residual(clean, [silent] * 3, repeats)
+    usual = learned(clean, [silent] * 3, repeats)
     noise = criticism.SumOfNoises((NOISE, usual))
     believed = replace(base.hypothesis, noise=noise.covariance(AT))
     found = scored_on_clean(believed, noise, base.signatures)
@@ -256,7 +211,7 @@ def test_clean_data_are_scored_by_what_the_others_teach(banks):
 
 def test_a_clean_set_alone_says_nothing_of_scores(banks):
     base = banks[0]
-    usual = criticism.usual_residual([BUMP[:, None]], [criticism.KnownNoise(0.0)], [True])
+    usual = learned([BUMP[:, None]], [criticism.KnownNoise(0.0)], [True])
     for noise in (NOISE, criticism.SumOfNoises((NOISE, usual))):
         assert scored_on_clean(base.hypothesis, noise, base.signatures)["bump"].clean == 1.0
 
@@ -273,25 +228,20 @@ def test_what_clean_data_show_as_well_is_no_discovery(banks):
     assert beside.p_smooth == alone.p_smooth
 
 
-@pytest.mark.parametrize(("low", "high", "side"), [(-2.0, 2.0, 0), (0.0, 2.0, 1), (-2.0, 0.0, -1)])
-def test_a_prior_says_on_which_side_an_effect_can_act(low, high, side):
-    extensions = {"bump": criticism.Extension(dist.Uniform(low, high))}
-    observed = observe(exact, 3)
-    experiment = criticism.Experiment(exact, observed, NOISE)
-    study = Study(experiment, PRIOR, extensions, Compute(batch=64))
-    found = examine(study, None)[0].signatures
-    assert found["bump"].side == side
-    assert found["bump"].change @ BUMP > 0.0  # towards a greater coefficient, on either side
+def test_a_prior_says_on_which_side_an_effect_can_act():
+    for low, high, side in ((-2.0, 2.0, 0), (0.0, 2.0, 1), (-2.0, 0.0, -1)):
+        extensions = {"bump": criticism.Extension(dist.Uniform(low, high))}
+        data = criticism.Experiment(exact, observe(exact, 3), NOISE)
+        found = examine(Study(data, PRIOR, extensions, Compute(batch=64)), None).signatures
+        assert found["bump"].side == side
+        assert found["bump"].change @ BUMP > 0.0  # towards a greater coefficient, on either side
 
 
-@pytest.mark.parametrize("bump", [-1.0, 1.0])
-def test_an_effect_is_scored_on_the_side_on_which_it_can_act(banks, bump):
+def test_an_effect_is_scored_on_the_side_on_which_it_can_act(banks):
     base = banks[0]
-    wrong = on(base.hypothesis, observe(noisy, 7, bump))
     both = base.signatures["bump"]
     assert both.side == 0  # the prior allows either
-    p_scores = [
-        check(wrong, {"bump": both._replace(side=side)}, base.null).p_score for side in (-1, 1)
-    ]
-    assert p_scores[bump > 0.0] < 0.01
-    assert p_scores[bump < 0.0] > 0.5
+    for bump, side in itertools.product((-1.0, 1.0), (-1, 1)):
+        wrong = on(base.hypothesis, observe(noisy, 7, bump))
+        found = check(wrong, {"bump": both._replace(side=side)}, base.null).p_score
+        assert found < 0.01 if bump * side > 0.0 else found > 0.5

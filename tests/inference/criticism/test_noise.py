@@ -1,20 +1,31 @@
-"""The noises that criticism reckons with: learned from rest and clean data, drawn as believed."""
+"""Noise and model error: learned from rest and clean data, drawn as believed, given to a fit."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
+import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.measurement_noise import CORRELATIONS, gaussian
-from bolfi_liquids.inference.criticism.usual_residual import REPEATED
+from bolfi_liquids.inference.criticism.model_errors import REPEATED
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
-from scipy.stats import chi2, chisquare, norm
+from scipy.stats import binom, chi2, chisquare, norm
+
+from bolfi_liquids import inference
 
 ALPHA = 1e-4  # false alarms per test
 DRAWS, RUNS, BINS = 63, 128, 8  # of the rank test; the bins divide DRAWS + 1
 FREEDOM = 20
+
+
+def learned(residuals, noises, same, distances=None):
+    """The model error that these clean data teach."""
+    far = np.zeros(len(residuals)) if distances is None else distances
+    given = zip(residuals, noises, same, far, strict=True)
+    return criticism.learned_model_error([criticism.CleanData(*one) for one in given])
 
 
 def autoregressive(rng, shape, sd, correlation):
@@ -22,13 +33,6 @@ def autoregressive(rng, shape, sd, correlation):
     white = rng.normal(size=shape)
     white[1:] *= np.sqrt(1.0 - correlation**2)
     return sd * lfilter([1.0], [1.0, -correlation], white, axis=0)
-
-
-@pytest.fixture
-def gappy():
-    """Two channels, sample after sample, some missing: as a flattened output with NaN."""
-    at = np.delete(np.arange(20), [3, 4, 6, 11])
-    return Layout(at % 2, at // 2)
 
 
 # Learned from rest.
@@ -82,38 +86,6 @@ def test_a_trend_that_is_not_taken_out_is_taken_for_correlated_noise():
     assert criticism.rest_noise([rest], trend=0).correlation.mean() > 0.8
 
 
-@pytest.mark.parametrize(("samples", "channels", "trend"), [(8, 1, 0), (4, 2, 0), (9, 1, 1)])
-def test_stretches_too_short_to_learn_from_are_refused(samples, channels, trend):
-    rest = np.random.default_rng(0).normal(size=(samples, channels))
-    with pytest.raises(ValueError, match="of 8 needed; give longer ones"):
-        criticism.rest_noise([rest], trend=trend)
-    more = np.random.default_rng(0).normal(size=(samples + 1, channels))
-    assert criticism.rest_noise([more], trend=trend).samples == more.size
-
-
-REST = np.random.default_rng(0).normal(size=(40, 2))
-
-
-@pytest.mark.parametrize("trend", [0, 1])
-@pytest.mark.parametrize("still", [0.0, 0.3, -7e5])
-def test_a_channel_that_stands_still_measures_no_noise(still, trend):
-    """Nor is it taken for a measurement beside one that varies."""
-    constant = np.full((40, 2), still)
-    beside = np.column_stack([REST[:, 0], constant[:, 1]])
-    for rest, channel in ((constant, 0), (beside, 1)):
-        with pytest.raises(ValueError, match=f"rests do not vary in channel {channel}"):
-            criticism.rest_noise([rest, rest[:9]], trend=trend)
-    varying = criticism.rest_noise([still + 1e-6 * REST], trend=trend)
-    assert abs(varying.sd.mean() / 1e-6 - 1.0) < 0.3
-
-
-def test_stretches_of_another_form_are_refused():
-    with pytest.raises(ValueError, match=r"must have shape \[samples, channels\], got \(40,\)"):
-        criticism.rest_noise([REST[:, 0]])
-    with pytest.raises(ValueError, match="rests must be finite, got 1 missing samples of 80"):
-        criticism.rest_noise([np.where(np.arange(80).reshape(40, 2) == 5, np.nan, REST)])
-
-
 # Drawn as believed.
 
 
@@ -127,32 +99,35 @@ AR = criticism.AutoregressiveNoise(np.array([0.5, 0.7, 0.6]), np.array([0.2, 0.9
 SIZES = criticism.KnownNoise(np.linspace(0.1, 2.0, 16))
 RESIDUALS = [autoregressive(np.random.default_rng(k), (10, 2), 1.0, 0.8) for k in range(FREEDOM)]
 NOTHING = criticism.KnownNoise(0.0)
-USUAL = criticism.usual_residual(RESIDUALS, [NOTHING] * FREEDOM, [True] * FREEDOM)
+USUAL = learned(RESIDUALS, [NOTHING] * FREEDOM, [True] * FREEDOM)
 NOISES = {
     "known": (criticism.KnownNoise(0.3), 1.0),
     "of each sample": (SIZES, 1.0),
     "autoregressive": (AR, 1.0),
     "sum": (criticism.SumOfNoises((AR, SIZES)), 1.0),
     # of a size that is known as well as a variance from FREEDOM numbers: Student's t
-    "usual residual": (USUAL, FREEDOM / (FREEDOM - 2.0)),
+    "model error": (USUAL, FREEDOM / (FREEDOM - 2.0)),
 }
 
 
-@pytest.mark.parametrize("kind", NOISES)
-def test_draws_have_the_covariance(gappy, kind):
-    noise, wider = NOISES[kind]
-    drawn = noise.draw(np.random.default_rng(0), gappy, 20_000)
-    covariance = wider * noise.covariance(gappy)
-    limit = norm.isf(ALPHA / 2 / covariance.size)
-    assert deviation(drawn, covariance) < limit
-    assert deviation(1.05 * drawn, covariance) > limit
-
-
-def test_white_draws_are_not_taken_for_correlated_ones(gappy):
+def test_draws_have_the_covariance_that_is_believed():
+    """Also beside gaps and in two channels; white draws of the same variances are found out."""
+    at = np.delete(np.arange(20), [3, 4, 6, 11])
+    gappy = Layout(at % 2, at // 2)  # sample after sample, some missing: a flattened output
+    limit = norm.isf(ALPHA / 2 / 16**2)
+    found = {}
+    for kind, (noise, wider) in NOISES.items():
+        drawn, covariance = (
+            noise.draw(np.random.default_rng(0), gappy, 20_000),
+            noise.covariance(gappy),
+        )
+        found[kind] = deviation(drawn, wider * covariance)
+        assert deviation(1.05 * drawn, wider * covariance) > limit
+    assert max(found.values()) < limit, found
     covariance = AR.covariance(gappy)
     white = criticism.KnownNoise(np.sqrt(np.diag(covariance)))
     drawn = white.draw(np.random.default_rng(0), gappy, 20_000)
-    assert deviation(drawn, covariance) > 2.0 * norm.isf(ALPHA / 2 / covariance.size)
+    assert deviation(drawn, covariance) > 2.0 * limit
 
 
 # Learned from clean data.
@@ -172,7 +147,7 @@ def clean():
 def test_the_autocovariance_of_a_stationary_process_is_recovered(clean):
     """Within Bartlett's errors; measurement noise, and the residuals' own noise, apart."""
     measured = criticism.KnownNoise(np.sqrt(WHITE))
-    found = criticism.usual_residual(clean, [measured] * SETS, [False] * SETS).autocovariance
+    found = learned(clean, [measured] * SETS, [False] * SETS).autocovariance
     lags = np.arange(25)
     expected = 0.8**lags * (1.0 - lags / LENGTH)
     m = np.arange(-200, 201)
@@ -185,7 +160,7 @@ def test_the_autocovariance_of_a_stationary_process_is_recovered(clean):
     error = np.sqrt(variance / (2 * SETS * LENGTH))
     limit = norm.isf(ALPHA / 2 / len(lags))
     assert np.abs((found[lags] - expected) / error).max() < limit
-    ignored = criticism.usual_residual(clean, [NOTHING] * SETS, [False] * SETS).autocovariance
+    ignored = learned(clean, [NOTHING] * SETS, [False] * SETS).autocovariance
     np.testing.assert_allclose(ignored[0] - found[0], WHITE, atol=0.01)
 
 
@@ -194,36 +169,36 @@ def test_residuals_of_the_same_experiment_say_where_it_errs_again(clean):
     again = [residual[:40].copy() for residual in clean[:3]]
     again[1][7, 0] = np.nan
     noises, same = [criticism.KnownNoise(0.2)] * 3, [False, True, True]
-    learned = criticism.usual_residual(again, noises, same)
-    stationary = np.kron(np.eye(2), toeplitz(learned.autocovariance))
-    told = learned.covariance(at)
+    found = learned(again, noises, same)
+    stationary = np.kron(np.eye(2), toeplitz(found.autocovariance))
+    told = found.covariance(at)
     # two repetitions, as alike as they are like these data, leave no less of the variance
     remains = np.diag(told) / np.diag(stationary)
     assert 1.0 - 2.0 * REPEATED**2 / (1.0 + REPEATED) < remains.min() and remains.max() < 0.6
-    expected = learned.mean(at).reshape(2, 40).T
+    expected = found.mean(at).reshape(2, 40).T
     for residual in again[1:]:
         seen = np.isfinite(residual)
         assert np.corrcoef(residual[seen], expected[seen])[0, 1] > 0.5
     # what repeats another experiment, or this one in another regime, tells nothing of where
     for other in (
-        criticism.usual_residual(again, noises, [False] * 3),
-        criticism.usual_residual(again, noises, same, [6.0, 6.0, 6.0]),
+        learned(again, noises, [False] * 3),
+        learned(again, noises, same, [6.0, 6.0, 6.0]),
     ):
         np.testing.assert_allclose(other.covariance(at), stationary, atol=1e-12)
         assert not other.mean(at).any()
-    assert (learned.freedom, other.freedom) == (3, 3)
+    assert (found.freedom, other.freedom) == (3, 3)
 
 
 @pytest.mark.parametrize("away", [[0.0, 0.0], [0.5, -1.0]], ids=["one regime", "three regimes"])
 def test_what_is_expected_of_a_simulator_is_right_as_often_as_it_says(away):
-    """Drawn together from the model: misses, whitened as is said, are chi-square."""
+    """Drawn together from the model: misses, whitened, are chi-square."""
     at, drawn = Layout(np.repeat([0, 1], 30), np.tile(np.arange(30), 2)), 200
     places = np.array([0.0, *away])
     over = np.exp(-0.5 * np.subtract.outer(places, places) ** 2)
     over = REPEATED * over + (1.0 - REPEATED) * np.eye(3)
     process = np.kron(over, np.kron(np.eye(2), toeplitz(0.8 ** np.arange(30))))
     rng, measured = np.random.default_rng(0), criticism.KnownNoise(0.3)
-    taught = criticism.usual_residual(list(np.zeros((2, 30, 2))), [measured] * 2, [True] * 2, away)
+    taught = learned(list(np.zeros((2, 30, 2))), [measured] * 2, [True] * 2, away)
     misses = []
     for truth in gaussian(rng, process, drawn).reshape(drawn, 3, 60):
         clean = [one.reshape(2, 30).T + 0.3 * rng.normal(size=(30, 2)) for one in truth[1:]]
@@ -231,7 +206,7 @@ def test_what_is_expected_of_a_simulator_is_right_as_often_as_it_says(away):
             taught,
             autocovariance=0.8 ** np.arange(30),
             clean=tuple(
-                one._replace(residual=residual)
+                replace(one, residual=residual)
                 for one, residual in zip(taught.clean, clean, strict=True)
             ),
         )
@@ -245,28 +220,25 @@ def test_what_is_expected_of_a_simulator_is_right_as_often_as_it_says(away):
 def test_what_is_learned_in_another_regime_counts_little(clean):
     """One in which the simulator errs tenfold, far away."""
     two, none = list(clean[:2]), [NOTHING] * 3
-    alone = criticism.usual_residual(two, none[:2], [False] * 2)
+    alone = learned(two, none[:2], [False] * 2)
     all_three = [*two, 10.0 * clean[2]]
-    beside = criticism.usual_residual(all_three, none, [False] * 3, [0.0, 0.0, 5.5])
+    beside = learned(all_three, none, [False] * 3, [0.0, 0.0, 5.5])
     expected = alone.autocovariance
     np.testing.assert_allclose(beside.autocovariance, expected, atol=1e-3 * expected[0])
     assert beside.freedom == pytest.approx(2.0, abs=1e-3)
-    with pytest.raises(ValueError, match="regime_distance must be 2 finite numbers"):
-        criticism.usual_residual(two, none[:2], [True, True], [1.0, np.nan])
 
 
-@pytest.mark.parametrize("longest", [12, 40, 70], ids=["shorter", "as long", "longer"])
-def test_the_covariance_is_positive_semidefinite(longest):
+def test_the_covariance_is_positive_semidefinite():
     """Also where the noise exceeds the residuals, they alternate, or the data are longer."""
     rng = np.random.default_rng(0)
-    at = Layout(np.zeros(longest, int), np.arange(longest))
     waves = np.cos(np.pi * np.arange(40))[:, None] * [1.0, -1.0]
     lengths = [rng.normal(size=(samples, 2)) for samples in (20, 40)]
-    for residuals in ([waves], lengths, [waves, *lengths], [np.cumsum(waves, 0) + 3.0]):
-        for noise in (0.0, 0.5, 2.0):
+    for residuals in ([waves], [waves, *lengths], [np.cumsum(waves, 0) + 3.0]):
+        for noise, longest in itertools.product((0.0, 2.0), (12, 70)):
             noises = [criticism.KnownNoise(noise)] * len(residuals)
-            learned = criticism.usual_residual(residuals, noises, [False] * len(residuals))
-            values = np.linalg.eigvalsh(learned.covariance(at))
+            found = learned(residuals, noises, [False] * len(residuals))
+            at = Layout(np.zeros(longest, int), np.arange(longest))
+            values = np.linalg.eigvalsh(found.covariance(at))
             assert values[0] > -1e-9 * max(values[-1], 1e-12)
 
 
@@ -274,41 +246,70 @@ def test_what_the_others_teach_is_learned_in_the_regime_of_the_one_left_out(clea
     """Two regimes, in one of which the simulator errs tenfold."""
     sets = [clean[0], clean[1], 10.0 * clean[2], 10.0 * clean[3]]
     away = [0.0, 0.1, 6.0, 6.1]
-    found = criticism.usual_residual(sets, [NOTHING] * 4, [True] * 4, away)
+    found = learned(sets, [NOTHING] * 4, [True] * 4, away)
     sizes = [taught.autocovariance[0] ** 0.5 for *_, taught in found.leave_one_out()]
     np.testing.assert_allclose(sizes, [1.0, 1.0, 10.0, 10.0], rtol=0.2)
     weights = [weight for _, weight, _ in found.leave_one_out()]
     assert weights[0] == 1.0 and weights[1] > 0.99 and max(weights[2:]) < 1e-3
-
-
-def test_one_whose_regime_the_others_do_not_tell_of_is_not_judged(clean):
-    found = criticism.usual_residual(clean[:3], [NOTHING] * 3, [True] * 3, [0.0, 0.3, 6.0])
-    assert [one.regime_distance for one, *_ in found.leave_one_out()] == [0.0, 0.3]
+    # one whose regime the others do not tell of is not judged
+    alone = learned(clean[:3], [NOTHING] * 3, [True] * 3, [0.0, 0.3, 6.0])
+    assert [one.regime_distance for one, *_ in alone.leave_one_out()] == [0.0, 0.3]
 
 
 def test_a_simulator_that_leaves_nothing_leaves_nothing(clean):
     at = Layout(np.zeros(20, int), np.arange(20))
-    found = criticism.usual_residual([0.0 * clean[0]] * 2, [NOTHING] * 2, [True] * 2)
+    found = learned([0.0 * clean[0]] * 2, [NOTHING] * 2, [True] * 2)
     assert not found.mean(at).any() and not found.covariance(at).any()
 
 
-@pytest.mark.parametrize(
-    ("residuals", "noises", "same", "message"),
-    [
-        ([], [], [], "at least one clean data set"),
-        ([np.ones((9, 1))] * 2, [NOTHING], [True] * 2, "noises must have 2 entries, got "),
-        ([np.ones((9, 1))] * 2, [NOTHING] * 2, [True], "same must have 2 entries, got "),
-        ([np.full((9, 1), np.nan)], [NOTHING], [True], "data set 0 has no finite value"),
-        ([np.full((9, 1), np.inf)], [NOTHING], [True], "data set 0 must not be infinite"),
-        ([np.ones(9)], [NOTHING], [True], r"data set 0 must be of the shape \[T, channels\]"),
-        ([np.ones((9, 1)), np.ones((9, 2))], [NOTHING] * 2, [False] * 2, "data set 1 must be"),
-        ([np.ones((9, 1)), np.ones((8, 1))], [NOTHING] * 2, [True] * 2, "of one shape, got"),
-        (["abc"], [NOTHING], [True], "data set 0 must be an array of numbers"),
-        ([np.ones((9, 1))], [0.05], [True], r"noises\[0\] must be a Noise"),
-        ([np.ones((9, 1))], NOTHING, [True], "noises must have 1 entries"),
-        ([np.ones((9, 1))], [NOTHING], True, "same must have 1 entries"),
-    ],
-)
-def test_clean_data_that_teach_nothing_are_refused(residuals, noises, same, message):
-    with pytest.raises(ValueError, match=message):
-        criticism.usual_residual(residuals, noises, same)
+# Given.
+
+SAMPLES, TIME, SIZE, SD, TRUTH = 100, 8.0, 0.5, 0.1, 2.0
+SHAPE = np.sin(2.0 * np.pi * np.arange(SAMPLES) / 30.0)
+DATA = 40
+ERRORS = SIZE**2 * np.exp(-np.abs(np.subtract.outer(np.arange(SAMPLES), np.arange(SAMPLES))) / TIME)
+
+
+def intervals(noise):
+    """90 % intervals [DATA, 2] of the amplitude that makes SHAPE, from 12 runs spread evenly."""
+    rng = np.random.default_rng(7)
+    prior = inference.Prior({"a": dist.Uniform(0.0, 4.0)})
+    errors = rng.multivariate_normal(np.zeros(SAMPLES), ERRORS, size=DATA)
+    runs = prior.from_unit((np.arange(12.0)[:, None] + 0.5) / 12.0)
+    signals = runs["a"][:, None] * SHAPE + 0.02 * rng.normal(size=(12, SAMPLES))
+    at = prior.from_unit((np.arange(2000)[:, None] + 0.5) / 2000.0)
+    found = []
+    for error in errors:
+        observed = TRUTH * SHAPE + error + SD * rng.normal(size=SAMPLES)
+        engine = inference.Bolfi(prior, observed, noise=noise, misfit=0.0)
+        engine.tell(runs, signals)
+        log_density = engine.fit(warn=False).log_prob(at)
+        mass = np.cumsum(np.exp(log_density - log_density.max()))
+        found.append(np.interp([0.05, 0.95], mass / mass[-1], at["a"]))
+    return np.array(found)
+
+
+@pytest.mark.slow
+def test_intervals_hold_beside_the_error_and_only_then():
+    """The exact posterior has an sd of 0.144; coverage of 0.6 would pass once in 1e3."""
+    known = criticism.KnownNoise(SD)
+    beside = criticism.SumOfNoises((known, criticism.model_error(SIZE, TIME)))
+    found, ignoring = intervals(beside), intervals(known)
+    held = [np.sum((low <= TRUTH) & (high >= TRUTH)) for low, high in (found.T, ignoring.T)]
+    assert held[0] >= binom.ppf(1e-3, DATA, 0.9) > held[1]
+    exact = 1.0 / np.sqrt(SHAPE @ np.linalg.solve(ERRORS + SD**2 * np.eye(SAMPLES), SHAPE))
+    assert np.ptp(found, 1).mean() == pytest.approx(3.29 * exact, rel=0.1)
+
+
+def test_a_process_has_the_size_and_correlation_that_were_given():
+    at = Layout(np.repeat([0, 1], SAMPLES), np.tile(np.arange(SAMPLES), 2))
+    found = criticism.model_error(SIZE, TIME).covariance(at)
+    np.testing.assert_allclose(found[:SAMPLES, :SAMPLES], ERRORS, atol=1e-4)
+    assert not found[:SAMPLES, SAMPLES:].any()
+
+
+def test_the_rhythm_of_a_sine_is_its_cosine():
+    found = criticism.rhythm(np.column_stack([SHAPE, 5.0 + SHAPE]))
+    expected = np.cos(2.0 * np.pi * np.arange(60) / 30.0) * (1.0 - np.arange(60) / SAMPLES)
+    np.testing.assert_allclose(found[:60], expected, atol=0.1)
+    assert criticism.rhythm(np.ones((5, 2))).tolist() == [1.0]

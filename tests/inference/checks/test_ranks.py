@@ -1,11 +1,14 @@
-"""Thinning to independence, and ranks that pool unlike numbers of draws."""
+"""Thinning to independence, ranks that pool unlike numbers of draws, and their exact bands."""
+
+import itertools
 
 import arviz_base
 import numpy as np
 import pandas as pd
 import pytest
-from bolfi_liquids.inference.checks import draws, ranks
-from scipy.stats import chisquare
+from bolfi_liquids.inference.checks import one_replicate as draws
+from bolfi_liquids.inference.checks import ranks
+from scipy.stats import binom, chisquare
 
 ALPHA = 1e-4  # false alarms per test
 
@@ -30,19 +33,16 @@ def test_reads_mappings_and_trees_alike():
         assert draws.posterior_array(given, ("a", "b")).shape == (1, 6, 2)
 
 
-@pytest.mark.parametrize(
-    ("made", "said"),
-    [
+def test_refuses_other_forms():
+    for made, said in (
         ({"a": np.zeros(3)}, "must hold the parameters"),
         ({"a": np.zeros(3), "b": np.zeros(4)}, "one shape"),
         ({"a": np.zeros((1, 2, 3)), "b": np.zeros((1, 2, 3))}, "one shape"),
         ({"a": np.zeros(0), "b": np.zeros(0)}, "not empty"),
         (np.zeros((3, 2)), "name -> draws"),
-    ],
-)
-def test_refuses_other_forms(made, said):
-    with pytest.raises(ValueError, match=said):
-        draws.posterior_array(made, ("a", "b"))
+    ):
+        with pytest.raises(ValueError, match=said):
+            draws.posterior_array(made, ("a", "b"))
 
 
 def test_effective_size_of_known_chains():
@@ -57,12 +57,12 @@ def test_effective_size_of_known_chains():
 def test_thinned_draws_are_no_longer_correlated():
     """Two autocorrelation times of correlation 0.95 leave 0.02; one would leave 0.14."""
     products = []
-    for seed in range(30):
+    for seed in range(12):
         array = chains(0.95, (2, 8000), seed)
         kept = draws.thin(array, 10**4, draws.effective_size(array))[:, 0]
         products.append(kept[1:] * kept[:-1])
     pooled = np.concatenate(products)
-    assert len(pooled) > 3000
+    assert len(pooled) > 1200
     assert pooled.mean() < 0.018 + 4 / np.sqrt(len(pooled))
 
 
@@ -94,8 +94,59 @@ def test_plain_ranks_and_ties():
     np.testing.assert_array_equal(ranks.to_ranks(u, 3), [0, 2, 2])  # the tie at random: 4 x 0.6
 
 
-@pytest.mark.parametrize(
-    ("n", "draws", "bins"), [(256, 63, 16), (100, 63, 8), (25, 63, 2), (256, 99, 20)]
-)
-def test_bins_divide_ranks_evenly(n, draws, bins):
-    assert ranks.bin_count(n, draws) == bins
+def test_bins_divide_ranks_evenly():
+    expected = {(256, 63): 16, (100, 63): 8, (25, 63): 2, (256, 99): 20, (9, 6): 2}
+    assert {given: ranks.bin_count(*given) for given in expected} == expected
+
+
+# Simultaneous bands.
+
+RUNS = 2000
+
+
+def outside(counts, band):
+    return ((counts < band.lower) | (counts > band.upper)).any()
+
+
+def counts_of(rng, n, draws):
+    return ranks.counts_below(rng.integers(0, draws + 1, n), draws)
+
+
+def test_p_value_is_that_of_all_possible_ranks():
+    """Enumerated: the share of all rank vectors at least as far out as the one at hand."""
+    n, most = 4, 3
+    every = [np.array(one) for one in itertools.product(range(most + 1), repeat=n)]
+    z = np.arange(1, most + 1) / (most + 1)
+
+    def statistic(one):
+        below = np.array([(one < k).sum() for k in range(1, most + 1)])
+        return np.minimum(binom.cdf(below, n, z), binom.sf(below - 1, n, z)).min()
+
+    found = np.array([statistic(one) for one in every])
+    for one, value in list(zip(every, found, strict=True))[::6]:
+        expected = np.mean(found <= value * (1 + 1e-12))
+        assert ranks.p_value(one, most) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize(("n", "draws", "level"), [(256, 63, 0.95), (50, 31, 0.5)])
+def test_holds_whole_curves_as_often_as_it_says(n, draws, level):
+    """2000 sets of uniform ranks: standard error 0.005 at 0.95; discreteness may add 0.02."""
+    rng = np.random.default_rng(0)
+    band = ranks.band(n, draws, level)
+    held = RUNS - sum(outside(counts_of(rng, n, draws), band) for _ in range(RUNS))
+    assert held >= binom.ppf(ALPHA / 2, RUNS, level)
+    assert held <= binom.isf(ALPHA / 2, RUNS, min(level + 0.02, 1.0))
+
+
+def test_p_values_of_uniform_ranks_are_uniform():
+    rng = np.random.default_rng(1)
+    p = np.array([ranks.p_value(rng.integers(0, 16, 100), 15) for _ in range(RUNS // 4)])
+    for level in (0.05, 0.3, 0.7):
+        few, many = binom.ppf([ALPHA / 6, 1 - ALPHA / 6], p.size, level)
+        assert few - 0.02 * p.size <= np.sum(p <= level) <= many
+
+
+def test_many_replicates_and_certain_misfit_stay_finite():
+    band = ranks.band(2000, 31, 0.95)
+    assert (band.lower <= 2000 * band.z).all() and (2000 * band.z <= band.upper).all()
+    assert ranks.p_value(np.zeros(2000, np.int64), 31) == pytest.approx(0.0, abs=1e-9)

@@ -1,9 +1,10 @@
-"""A simulator's model error, learned from data in which no effect is believed to be missing."""
+"""A simulator's model error: its own residual, of known size or learned from clean data."""
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,16 +12,9 @@ from scipy.linalg import block_diag, solve
 
 from .._float64 import in_float64
 from .._lazy import stats
-from ..arguments import checked_array, checked_number
+from ..arguments import check_flag, check_kind, checked_array, checked_number
 from ..surrogates.measurement_noise import Layout
-from .measurement_noise import (
-    Noise,
-    SumOfNoises,
-    check_noise,
-    gaussian,
-    samples,
-    stationary,
-)
+from .measurement_noise import Noise, SumOfNoises, check_noise, gaussian, samples, stationary
 
 REPEATED = 0.85
 """Correlation of a simulator's errors in two repetitions of one experiment. Of the stirs of the
@@ -37,25 +31,44 @@ LAST_LAG = 12.0  # correlation times after which errors count as independent
 KNOWN_FREEDOM = 30.0  # of a size that is given: known within some 13 %
 
 
-class CleanData(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class CleanData:
     """Data in which no effect is believed to be missing.
 
     Attributes:
-        residual: Less the calibrated simulator's mean [T, channels]; NaN where missing.
-        noise: Of its measurement.
+        residual: Less the calibrated simulator's mean [T, channels], samples equally far apart;
+            NaN where missing.
+        noise: Of its measurement, which is not the simulator's fault.
         same: Whether it repeats the experiment that is looked at, sample by sample.
-        regime_distance: Of its regime from that of the data that are looked at, see
-            `usual_residual`.
+        regime_distance: Of its regime from that of the data that are looked at, along an axis on
+            which a simulator's errors change over a distance of 1.
+
+    Raises:
+        ValueError: `residual` is no [T, channels], infinite somewhere or nowhere finite, or another
+            field is not as above.
     """
 
     residual: np.ndarray
     noise: Noise
-    same: bool
-    regime_distance: float
+    same: bool = True
+    regime_distance: float = 0.0
+
+    def __post_init__(self) -> None:
+        residual = checked_array("residual", self.residual)
+        if residual.ndim != 2 or np.isinf(residual).any() or not np.isfinite(residual).any():
+            raise ValueError(
+                "residual must have the shape [T, channels], be finite somewhere and infinite "
+                f"nowhere (NaN is a missing sample), got {self.residual!r:.100}"
+            )
+        check_noise("noise", self.noise)
+        check_flag("same", self.same)
+        distance = checked_number("regime_distance", self.regime_distance, math.isfinite, "finite")
+        object.__setattr__(self, "residual", residual)
+        object.__setattr__(self, "regime_distance", distance)
 
     @property
     def correlation(self) -> float:
-        """Of the simulator's error on it with that on the data that are looked at."""
+        """Correlation of the simulator's error on it with that on the data that are looked at."""
         return REPEATED * float(_likeness(self.regime_distance)) * self.same
 
     def values(self, at: Layout) -> np.ndarray:
@@ -64,7 +77,7 @@ class CleanData(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class UsualResidual:
+class ModelError:
     """A simulator's own residual, as a Gaussian process of uncertain size.
 
     Over time it is stationary, of the clean data's mean autocovariance. Over regimes its
@@ -89,7 +102,7 @@ class UsualResidual:
         return self._given(at)[0]
 
     def covariance(self, at: Layout) -> np.ndarray:
-        """Of the residual about that mean [n, n]."""
+        """Covariance of the residual about that mean [n, n]."""
         return self._given(at)[1]
 
     def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
@@ -112,18 +125,18 @@ class UsualResidual:
         freedom = max(self.freedom, MIN_FREEDOM)
         return stats.invgamma(freedom / 2.0, scale=freedom / 2.0)
 
-    def leave_one_out(self) -> "Iterator[tuple[CleanData, float, UsualResidual]]":
-        """Each repetition of the experiment, its weight, and what the other clean data teach of it.
+    def leave_one_out(self) -> "Iterator[tuple[CleanData, float, ModelError]]":
+        """Each repetition of the experiment, its weight, and the model error that the others teach.
 
         Those are left out of whose regime the others tell next to nothing.
         """
         for k, (one, weight) in enumerate(zip(self.clean, _weights(self.clean), strict=True)):
             others = [
-                other._replace(regime_distance=other.regime_distance - one.regime_distance)
+                replace(other, regime_distance=other.regime_distance - one.regime_distance)
                 for other in self.clean[:k] + self.clean[k + 1 :]
             ]
             if one.same and sum(_likeness(other.regime_distance) for other in others) >= MIN_OTHERS:
-                yield one, float(weight), _learned(others)
+                yield one, float(weight), learned_model_error(others)
 
     def _given(self, at: Layout) -> tuple[np.ndarray, np.ndarray]:
         """Mean and covariance given the repetitions."""
@@ -139,39 +152,38 @@ class UsualResidual:
 
 @lru_cache(maxsize=4)  # the data, those held out, and one that is left out
 @in_float64
-def _conditional(
-    usual: UsualResidual, channel: bytes, sample: bytes
-) -> tuple[np.ndarray, np.ndarray]:
+def _conditional(error: ModelError, channel: bytes, sample: bytes) -> tuple[np.ndarray, np.ndarray]:
     """A Gaussian's conditional, kept: all hypotheses of an experiment ask for the same."""
     at = Layout(np.frombuffer(channel, int), np.frombuffer(sample, int))
-    told = [
+    known = [
         (one, there)
-        for one in usual.clean
+        for one in error.clean
         if one.correlation > MIN_CORRELATION and len((there := samples(one.residual)).sample)
     ]
-    by_lag = usual._over([at, *(there for _, there in told)])
-    alone = stationary(by_lag, at, at)
-    if not told or not by_lag.any():
-        return _frozen(np.zeros(len(at.sample))), _frozen(alone)
-    across = np.vstack([one.correlation * stationary(by_lag, there, at) for one, there in told])
-    errors = np.block(
-        [
-            [_correlation(one, other) * stationary(by_lag, there, where) for other, where in told]
-            for one, there in told
-        ]
-    )
-    measured = np.asarray(block_diag(*(one.noise.covariance(there) for one, there in told)))
-    joint = errors + measured
-    joint += JITTER * joint.max() * np.eye(len(joint))
-    seen = np.concatenate([one.values(there) for one, there in told])
-    weight = solve(joint, across, assume_a="pos")
-    return _frozen(weight.T @ seen), _frozen(alone - across.T @ weight)
-
-
-def _frozen(array: np.ndarray) -> np.ndarray:
-    """Not to be written to, as all who ask get the same."""
-    array.flags.writeable = False
-    return array
+    by_lag = error._over([at, *(there for _, there in known)])
+    mean, covariance = np.zeros(len(at.sample)), stationary(by_lag, at, at)
+    if known and by_lag.any():
+        across = np.vstack(
+            [one.correlation * stationary(by_lag, there, at) for one, there in known]
+        )
+        errors = np.block(
+            [
+                [
+                    _correlation(one, other) * stationary(by_lag, there, where)
+                    for other, where in known
+                ]
+                for one, there in known
+            ]
+        )
+        measured = np.asarray(block_diag(*(one.noise.covariance(there) for one, there in known)))
+        joint = errors + measured
+        joint += JITTER * joint.max() * np.eye(len(joint))
+        seen = np.concatenate([one.values(there) for one, there in known])
+        weight = solve(joint, across, assume_a="pos")
+        mean, covariance = weight.T @ seen, covariance - across.T @ weight
+    for part in (mean, covariance):
+        part.flags.writeable = False  # all who ask get the same
+    return mean, covariance
 
 
 def _likeness(regime_distance: np.ndarray | float) -> np.ndarray:
@@ -180,58 +192,41 @@ def _likeness(regime_distance: np.ndarray | float) -> np.ndarray:
 
 
 def _correlation(one: CleanData, other: CleanData) -> float:
-    """Of the simulator's errors on two repetitions."""
+    """Correlation of the simulator's errors on two repetitions."""
     apart = one.regime_distance - other.regime_distance
     return 1.0 if one is other else REPEATED * float(_likeness(apart))
 
 
-def usual_residual(
-    residuals: Sequence[np.ndarray],
-    noises: Sequence[Noise],
-    same: Sequence[bool],
-    regime_distance: Sequence[float] | np.ndarray | None = None,
-) -> UsualResidual:
-    """Learn a simulator's residual from clean data.
+def learned_model_error(clean: Sequence[CleanData]) -> ModelError:
+    """Learn a simulator's model error from clean data.
 
-    Args:
-        residuals: Clean data less the calibrated simulator's mean, each [T, channels] with
-            samples equally far apart; NaN where missing.
-        noises: Of each one's measurement, which is not the simulator's fault.
-        same: Which of them repeat the experiment that will be looked at, sample by sample.
-        regime_distance: How far the regime of each is from that which will be looked at, along an
-            axis on which a simulator's errors change over a distance of 1; None where all are of
-            one regime. A simulator may err by much in one regime and by nothing in another: what is
-            learned of sizes is learned from the nearest.
+    A simulator may err by much in one regime and by nothing in another: what is learned of sizes is
+    learned from the nearest.
 
     Raises:
-        ValueError: there are none, they are not as many of each, one is no [T, channels] of the
-            others' channels, is infinite somewhere or nowhere finite, a noise is none, those of
-            the same experiment are not of one shape, or a distance is not finite.
+        ValueError: there are none, they differ in their number of channels, or those of the same
+            experiment in their shape.
     """
-    count = len(residuals)
-    if not count:
-        raise ValueError("a usual residual needs at least one clean data set")
-    away = np.zeros(count) if regime_distance is None else regime_distance
-    away = checked_array("regime_distance", away)
-    parts: dict[str, Any] = {"noises": noises, "same": same, "regime_distance": away}
-    for name, given in parts.items():
-        if np.ndim(given) != 1 or len(given) != count:
-            raise ValueError(f"{name} must have {count} entries, got {given!r:.100}")
-    if not np.isfinite(away).all():
-        raise ValueError(f"regime_distance must be {count} finite numbers, got {away}")
-    clean = [
-        CleanData(checked_array(f"clean data set {k}", one), noise, bool(again), float(distance))
-        for k, (one, noise, again, distance) in enumerate(
-            zip(residuals, noises, same, away, strict=True)
+    for one in clean:
+        check_kind("each of clean", one, CleanData)
+    shapes = [one.residual.shape for one in clean]
+    repeated = {one.residual.shape for one in clean if one.same}
+    if len({channels for _, channels in shapes}) != 1 or len(repeated) > 1:
+        raise ValueError(
+            "clean must hold at least one data set, all of as many channels, and repetitions of "
+            f"one experiment of one shape, got the shapes {shapes}"
         )
+    weight = _weights(clean)
+    lags = max(len(one.residual) for one in clean)
+    each = [
+        _autocovariance(one.residual, lags) - _expected_of(one.noise, len(one.residual), lags)
+        for one in clean
     ]
-    _check_clean(clean)
-    return _learned(clean)
+    mean = np.average(each, axis=0, weights=weight)
+    return ModelError(positive_autocovariance(mean), float(weight.sum()), tuple(clean))
 
 
-def model_error(
-    size: float, correlation: ArrayLike, freedom: float = KNOWN_FREEDOM
-) -> UsualResidual:
+def model_error(size: float, correlation: ArrayLike, freedom: float = KNOWN_FREEDOM) -> ModelError:
     """A model error of known size and correlation, without clean data to learn it from.
 
     Like any noise it goes into `Experiment`, and into `fit` as `noise=`, beside that of the
@@ -261,7 +256,7 @@ def model_error(
             "correlation must be a positive number of samples, or correlations by lag [lags] of "
             f"which the first is 1, got {correlation!r:.100}"
         )
-    return UsualResidual(size**2 * positive_autocovariance(by_lag), freedom)
+    return ModelError(size**2 * positive_autocovariance(by_lag), freedom)
 
 
 def rhythm(observed: ArrayLike) -> np.ndarray:
@@ -278,74 +273,20 @@ def rhythm(observed: ArrayLike) -> np.ndarray:
     return found / found[0] if found[0] > 0.0 else np.ones(1)
 
 
-def _check_clean(clean: Sequence[CleanData]) -> None:
-    channels = clean[0].residual.shape[1:]
-    shapes = {one.residual.shape for one in clean if one.same}
-    for k, (residual, noise, *_) in enumerate(clean):
-        if residual.ndim != 2 or residual.shape[1:] != channels:
-            raise ValueError(
-                f"clean data set {k} must be of the shape [T, channels], as many channels as the "
-                f"others have, got {residual.shape}"
-            )
-        if np.isinf(residual).any():
-            raise ValueError(f"clean data set {k} must not be infinite; NaN is a missing sample")
-        if not np.isfinite(residual).any():
-            raise ValueError(f"clean data set {k} has no finite value; leave it out")
-        check_noise(f"noises[{k}]", noise)
-    if len(shapes) > 1:
-        raise ValueError(
-            f"repetitions of one experiment must be of one shape, got {sorted(shapes)}"
-        )
-
-
 def _weights(clean: Sequence[CleanData]) -> np.ndarray:
     """Weights by the distance of regimes; the nearest has weight 1."""
     square = np.array([one.regime_distance**2 for one in clean])
     return np.maximum(np.exp(-0.5 * (square - np.min(square, initial=np.inf))), MIN_WEIGHT)
 
 
-def _learned(clean: Sequence[CleanData]) -> UsualResidual:
-    weight = _weights(clean)
-    lags = max(len(one.residual) for one in clean)
-    each = [
-        _autocovariance(one.residual, lags) - _expected_of(one.noise, len(one.residual), lags)
-        for one in clean
-    ]
-    mean = np.average(each, axis=0, weights=weight)
-    return UsualResidual(positive_autocovariance(mean), float(weight.sum()), tuple(clean))
-
-
-def without_model_error(noise: Noise) -> Noise:
-    """The noise that is not the simulator's fault."""
-    if not isinstance(noise, SumOfNoises):
-        return noise
-    return SumOfNoises(tuple(p for p in noise.parts if not isinstance(p, UsualResidual)))
-
-
-def model_error_part(noise: Noise) -> UsualResidual | None:
-    """The part of the noise that is the simulator's fault, if any is known."""
+def split_noise(noise: Noise) -> tuple[Noise, ModelError | None]:
+    """The measurement's noise, and the model error that was added to it."""
     parts = noise.parts if isinstance(noise, SumOfNoises) else ()
-    return next((part for part in parts if isinstance(part, UsualResidual)), None)
-
-
-def model_error_rms(noise: Noise, observed: np.ndarray) -> float:
-    """RMS of what a simulator may leave of data about `expected_model_error`; 0 if unknown.
-
-    Args:
-        observed: [*signal_shape], NaN where missing.
-    """
-    error = model_error_part(noise)
-    if error is None:
-        return 0.0
-    return float(np.sqrt(np.mean(np.diag(error.covariance(samples(observed))))))
-
-
-def expected_model_error(noise: Noise, observed: np.ndarray) -> np.ndarray:
-    """Expected residual of the simulator [*signal_shape]; 0 where nothing is known."""
-    error, expected = model_error_part(noise), np.zeros(observed.shape)
-    if error is not None:
-        expected[np.isfinite(observed)] = error.mean(samples(observed))
-    return expected
+    errors = [part for part in parts if isinstance(part, ModelError)]
+    if not errors:
+        return noise, None
+    measured = tuple(part for part in parts if not isinstance(part, ModelError))
+    return SumOfNoises(measured), errors[0]
 
 
 def _autocovariance(residual: np.ndarray, lags: int) -> np.ndarray:
