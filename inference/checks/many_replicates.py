@@ -20,7 +20,7 @@ from ..arguments import (
 from ..describe import describe
 from ..prior import Prior, checked_prior
 from ..progress import progress_bar
-from ..simulations.executors import Workers, open_executor
+from ..simulations.compute import Workers, open_executor
 from ..simulations.failures import is_unusable
 from ..simulations.job import BATCH
 from ..types import Simulator

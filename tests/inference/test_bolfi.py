@@ -254,7 +254,7 @@ def test_bad_calls_are_refused(prior, observed):
         engine.tell(theta, np.zeros((2, 29)))
     with pytest.raises(ValueError, match="theta must map the parameters"):
         engine.tell(0.5, np.zeros((1, 30)))
-    with pytest.raises(ValueError, match="signals must be an array of numbers, got 'loud'"):
+    with pytest.raises(ValueError, match="signals .*'loud'"):
         engine.tell(theta, "loud")
     with pytest.raises(ValueError, match="observed must be an array of numbers"):
         inference.Bolfi(prior, [[1.0], [1.0, 2.0]])
@@ -272,7 +272,7 @@ def test_bad_calls_are_refused(prior, observed):
     with pytest.raises(ValueError, match="seeds must have shape"):
         engine.tell(theta, np.zeros((2, 30)), seeds=[1])
     for seeds in ([0.5, 1.5], [1.0, 2.0], ["1", "2"], [True, False], [2**63, 0], [[1], [2, 3]]):
-        with pytest.raises(ValueError, match="seeds must be integers"):
+        with pytest.raises(ValueError, match="seeds"):
             engine.tell(theta, np.zeros((2, 30)), seeds=seeds)
     with pytest.raises(ValueError, match="n must be an integer"):
         engine.ask(0)

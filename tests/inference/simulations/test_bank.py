@@ -102,9 +102,7 @@ def test_a_path_that_cannot_be_used_is_named(tmp_path, simulate, prior, kind, na
 
 @pytest.mark.parametrize("path", [5, None, ""])
 def test_what_is_no_path_is_refused(path):
-    with pytest.raises(
-        ValueError, match=f"a simulation bank needs the path of a file, got {path!r}"
-    ):
+    with pytest.raises(ValueError, match=f"bank .*{path!r}"):
         inference.SimulationBank(path)
 
 

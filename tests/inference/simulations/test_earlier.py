@@ -24,8 +24,6 @@ def test_earlier_simulations_alone_are_confirmed_where_there_is_a_simulator(
     np.testing.assert_array_equal(confirmed.confirming, [10, 11, 12, 13])
     assert confirmed.confirmed
     assert confirmed.history.errors[0] == "too hot"
-    with pytest.raises(
-        ValueError, match=r"errors\[1\] is 'cold', but the signal of that run is finite"
-    ):
+    with pytest.raises(ValueError, match=r"errors\[1\]"):
         engine.tell(theta, signals, seeds, ["too hot", "cold", *errors[2:]])
     assert len(np.unique(confirmed.history.seeds)) == 14

@@ -331,7 +331,7 @@ def test_a_bad_signal_among_those_that_are_told_is_a_failed_run(prior, observed,
     engine.tell(theta, [good[0], None, good[2][:29], good[3] + 0j, good[4], "diverged"])
     assert engine.told == 6 and engine.succeeded == 2
     assert [error.partition(":")[0] for error in engine.history.errors if error] == ["unusable"] * 4
-    with pytest.raises(ValueError, match=r"signals must have shape \(6, 30\)|array of numbers"):
+    with pytest.raises(ValueError, match=r"signals .*\(6, 30\)"):
         engine.tell(theta, [row[:29] for row in good])
     assert engine.told == 6
 
