@@ -32,8 +32,6 @@ from .types import Simulator, Theta
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-
 
 LEAST_EFFECTIVE = 32.0  # points of a population that stand for a posterior
 MUCH_DOUBT = 1.5  # see `Fit.doubt`: beyond it more is simulated, and a fit warns
@@ -386,37 +384,3 @@ class Fit(Displayed):
             ValueError: the fit has no `recipe`, its noise is not known, or an argument is bad.
         """
         return self.recipe.criticise(self, extensions, **how)
-
-    def plot_search(self, ax: "Axes | None" = None) -> "Axes":
-        """Discrepancy of every simulation by the round in which it was asked.
-
-        Args:
-            ax: To draw on; None makes a figure.
-
-        Raises:
-            ValueError: `ax` is no axes of Matplotlib.
-        """
-        from .figures import plot_search
-
-        return plot_search(self.history, ax)
-
-    def plot_predictive(
-        self, sampled: "xr.DataTree | None" = None, axes: Any = None
-    ) -> "list[Axes]":
-        """The observed output, the closest simulation and the posterior predictive distribution.
-
-        The predictive distribution needs the signal family without a summary: the paper's
-        surrogate predicts discrepancies alone, and is drawn without it.
-
-        Args:
-            sampled: What `sample` returned; None samples here.
-            axes: One for each of the output's channels; None makes a figure.
-
-        Raises:
-            ValueError: `sampled` is no tree, or `axes` are no axes of Matplotlib, or too few.
-        """
-        from .figures import check_axes, plot_predictive
-
-        check_axes(axes)
-        tree = self.sample(draws=250, warmup=250, warn=False) if sampled is None else sampled
-        return plot_predictive(self.observed, self.closest.signal, tree, axes)
