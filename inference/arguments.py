@@ -102,10 +102,10 @@ def described(value: object) -> str:
     return f"an object of type {kind}"
 
 
-def require(fits: object, name: str, due: str, got: object) -> None:
-    """Raise ValueError, "{name} must {due}, got {got}", unless it fits."""
+def require(fits: object, name: str, due: str, got: object, cure: str = "") -> None:
+    """Raise ValueError, "{name} must {due}, got {got}; {cure}", unless it fits."""
     if not fits:
-        raise ValueError(f"{name} must {due}, got {got!r:.100}")
+        raise ValueError(f"{name} must {due}, got {got!r:.100}{cure and f'; {cure}'}")
 
 
 def checked_integer(name: str, value: object, least: int = 1, most: int = LARGEST_INTEGER) -> int:

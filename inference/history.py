@@ -186,9 +186,10 @@ def told_errors(
     given = np.full(n, None) if errors is None else np.asarray(errors, object)
     require(given.shape == (n,), "errors", f"have shape ({n},), one per theta", errors)
     told = list(map(_failure, given))
-    due = "be empty, for the signal of that run is finite: tell NaN in its place if it failed"
+    due = "be empty, for the signal of that run is finite"
     for run in np.flatnonzero(succeeded):
-        require(told[run] is None, f"errors[{run}]", due, told[run])
+        cure = 'tell NaN in its place if the run failed, or the error ""'
+        require(told[run] is None, f"errors[{run}]", due, told[run], cure)
     return told
 
 

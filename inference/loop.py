@@ -264,27 +264,23 @@ def fit_losses(
     Warns:
         EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
     """
-    if (noise is None) == (n is None):
-        raise ValueError(
-            "give either noise=, the sd of the data's noise, or n=, the number of data in a loss, "
-            f"got noise={noise!r:.100} and n={n!r:.100}"
-        )
+    one = (noise is None) != (n is None)
+    due = "be one, the sd of the data's noise or the number of data in a loss"
+    require(one, "either noise= or n=", due, (noise, n))
     engine = Bolfi(prior, surrogate="log_likelihood", initial=MIN_LEARN)
     losses, m = checked_array("loss", loss), len(np.atleast_2d(prior.to_array(theta)))
-    if losses.shape != (m,):
-        raise ValueError(f"loss must have shape ({m},), one per theta, got {losses.shape}")
-    if np.isfinite(losses).sum() < MIN_LEARN:
-        raise ValueError(
-            f"loss must hold {MIN_LEARN} finite numbers, got {np.isfinite(losses).sum()} of {m}: "
-            "simulate more"
-        )
+    require(losses.shape == (m,), "loss", f"have shape ({m},), one per theta", losses.shape)
+    finite = int(np.isfinite(losses).sum())
+    require(
+        finite >= MIN_LEARN, "loss", f"hold {MIN_LEARN} finite numbers", finite, "simulate more"
+    )
     least = np.nanmin(losses, initial=np.inf)
-    if least < 0.0 or (least == 0.0 and noise is None):
-        raise ValueError(
-            f"loss must hold sums of squares, {'positive' if noise is None else 'from 0'}, got "
-            f"{least:.4g}: leave such trials out, give noise= for a perfect fit, or give minus a "
-            'log likelihood, its sign changed, to fit(surrogate="log_likelihood")'
-        )
+    due = f"hold sums of squares, {'positive' if noise is None else 'from 0'}"
+    cure = (
+        "leave such trials out, give noise= for a perfect fit, or give minus a log likelihood, its "
+        'sign changed, to fit(surrogate="log_likelihood")'
+    )
+    require(least > 0.0 or (least == 0.0 and noise is not None), "loss", due, float(least), cure)
     if noise is not None:
         sd = checked_number("noise", noise, lambda sd: 0.0 < sd < np.inf, "positive and finite")
         values = -0.5 * losses / sd**2

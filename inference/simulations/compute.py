@@ -11,7 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 from ..arguments import check_timeout, checked_integer, require
 from .bank import SimulationBank
 
-SPAWNING = "ProcessPoolExecutor(n, mp_context=multiprocessing.get_context('spawn'))"
+SPAWNING = "give ProcessPoolExecutor(n, mp_context=multiprocessing.get_context('spawn'))"
 
 
 @runtime_checkable
@@ -121,16 +121,16 @@ def open_executor(
         # there is no public way to ask, and the default on Linux, up to Python 3.13, hangs at times
         context = getattr(given, "_mp_context", None)
         forks = context is not None and context.get_start_method() == "fork"
-        due = f"start no workers by fork, which JAX's threads do not survive: give {SPAWNING}"
-        require(not forks, "executor", due, given)
+        due = "start no workers by fork, which JAX's threads do not survive"
+        require(not forks, "executor", due, given, SPAWNING)
         if one_thread:
             _check_one_thread(given)
         yield given
 
 
 def _check_one_thread(executor: Executor | None) -> None:
-    due = f"be no threads, for the simulator serves only one of a process: give {SPAWNING}"
-    require(not isinstance(executor, ThreadPoolExecutor), "executor", due, executor)
+    due = "be no threads, for the simulator serves only one of a process"
+    require(not isinstance(executor, ThreadPoolExecutor), "executor", due, executor, SPAWNING)
     client = getattr(executor, "_client", None)  # of Dask's executor; there is no public way
     for worker, threads in client.nthreads().items() if isinstance(client, DaskClient) else ():
         if threads > 1:

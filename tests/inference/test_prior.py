@@ -163,7 +163,7 @@ def test_units_and_descriptions_are_kept():
 
 @pytest.mark.parametrize("units", [{"b": "m"}, {"a": 1.0}, ["m"], "m"])
 def test_bad_units_are_refused(units):
-    with pytest.raises(ValueError, match="units must map some of the parameters"):
+    with pytest.raises(ValueError, match="units must map"):
         inference.Prior({"a": dist.Uniform(0.0, 1.0)}, units=units)
 
 
@@ -175,19 +175,19 @@ def test_bad_units_are_refused(units):
         ([dist.Uniform(0.0, 1.0)], r"must map .* got \[<numpyro"),
         (
             {"a": dist.Uniform(1.0, 0.0)},
-            r"'a' must begin below its end, got Uniform\(low=1, high=0\)",
+            r"'a' must begin below its end, got 'Uniform\(low=1, high=0\)",
         ),
-        ({"a": dist.Uniform(1.0, 1.0)}, r"must begin below its end, got Uniform\(low=1, high=1\)"),
+        ({"a": dist.Uniform(1.0, 1.0)}, r"must begin below its end, got 'Uniform\(low=1, high=1\)"),
         ({"a": dist.LogUniform(2.0, 1.0)}, "must begin below its end"),
         ({"a": dist.TruncatedNormal(0.0, 1.0, low=2.0, high=1.0)}, "must begin below its end"),
-        ({"a": dist.Uniform(0.0, np.inf)}, r"finite arguments, got Uniform\(low=0, high=inf\)"),
-        ({"a": dist.Uniform(np.nan, 1.0)}, r"finite arguments, got Uniform\(low=nan, high=1\)"),
-        ({"a": dist.Normal(0.0, np.inf)}, r"finite arguments, got Normal\(loc=0, scale=inf\)"),
+        ({"a": dist.Uniform(0.0, np.inf)}, r"finite arguments, got 'Uniform\(low=0, high=inf\)"),
+        ({"a": dist.Uniform(np.nan, 1.0)}, r"finite arguments, got 'Uniform\(low=nan, high=1\)"),
+        ({"a": dist.Normal(0.0, np.inf)}, r"finite arguments, got 'Normal\(loc=0, scale=inf\)"),
         (
             {"offspring": dist.DiscreteUniform(1, 20)},
-            r"'offspring' must be continuous, got DiscreteUniform\(low=1, high=20\)",
+            r"'offspring' must be continuous, got 'DiscreteUniform\(low=1, high=20\)",
         ),
-        ({"a": dist.Poisson(3.0)}, r"'a' must be continuous, got Poisson\(rate=3\)"),
+        ({"a": dist.Poisson(3.0)}, r"'a' must be continuous, got 'Poisson\(rate=3\)"),
         ({"a": dist.TruncatedNormal(0.0, 1.0, low=50.0)}, "too far out in a tail"),
         ({"a": 1.0}, "numpyro distribution, got float"),
         ({"a": dist.Normal(np.zeros(2), 1.0)}, r"univariate with shape \(\), got \(2,\)"),
