@@ -1,5 +1,6 @@
 """Simulations that were told, and the reading of what a user tells."""
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import LARGEST_INT64, Unusable, checked_integer, float64, require
-from .simulations.failures import Failure, FailureKind, count, unusable
+from .simulations.failures import Failure, FailureKind, unusable
 from .simulations.job import commonest, signals_of
 
 UNKNOWN = -1  # seed or round of a simulation made elsewhere
@@ -98,7 +99,7 @@ class History(NamedTuple):
     @property
     def failures(self) -> dict[str, int]:
         """Failed runs by `FailureKind`."""
-        return count(self.why)
+        return dict(Counter(one.kind.value for one in self.why if one is not None))
 
 
 def told_signals(

@@ -16,7 +16,14 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from ..arguments import Unusable, check_callable, checked_integer, checked_mapping, float64
+from ..arguments import (
+    Unusable,
+    check_callable,
+    checked_integer,
+    checked_mapping,
+    float64,
+    require,
+)
 from ..types import Simulator, SingleSimulator
 from .bank import Simulation
 from .failures import Failure, is_unusable, raised, timed_out, unusable
@@ -140,18 +147,13 @@ def for_engine(
         ValueError: bad argument, or one that contradicts the simulator.
     """
     if isinstance(simulate, BatchSimulator | OneByOne):
-        if not vectorised or together != 1 or time_limit is not None:
-            raise ValueError(
-                f"a {type(simulate).__name__} holds itself how it is called: leave vectorised, "
-                "together and time_limit out"
-            )
+        silent = vectorised and together == 1 and time_limit is None
+        due = "come without vectorised, together and time_limit, which it holds itself"
+        require(silent, f"a {type(simulate).__name__}", due, (vectorised, together, time_limit))
         return simulate
     if vectorised:
         return BatchSimulator(cast(Simulator, simulate), together, time_limit)
-    if together != 1:
-        raise ValueError(
-            f"vectorised=False makes one run in each call: leave out together={together!r:.100}"
-        )
+    require(together == 1, "together", "be left out with vectorised=False", together)
     return OneByOne(cast(SingleSimulator, simulate), time_limit)
 
 
@@ -183,8 +185,7 @@ def stacked(results: Sequence[Simulation], shape: tuple[int, ...] | None = None)
         ValueError: signals of several shapes, or none and no `shape`.
     """
     found = {result.signal.shape for result in results if result.signal is not None}
-    if len(found) > 1:
-        raise ValueError(f"simulate must return signals of one shape, got {sorted(found)}")
+    require(len(found) <= 1, "simulate", "return signals of one shape", sorted(found))
     known = next(iter(found), shape)
     if known is None:
         raise ValueError(f"all {len(results)} simulations failed, so their shape is not known")

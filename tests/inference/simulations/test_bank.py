@@ -129,7 +129,7 @@ def test_all_simulations_of_one_identity(tmp_path):
 
 def test_simulations_that_are_not_alike_are_refused():
     with inference.SimulationBank() as bank:
-        with pytest.raises(ValueError, match="identity='id', got none"):
+        with pytest.raises(ValueError, match="identity='id', got None"):
             bank.simulations("id")
         for a in (2, 3):
             bank.put("id", {"a": a}, 0, simulations.Simulation(np.zeros(a), None, 0.0))

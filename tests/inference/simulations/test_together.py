@@ -66,7 +66,7 @@ def test_what_is_no_number_of_simulations_is_refused(together):
     ],
 )
 def test_what_contradicts_a_simulator_is_refused(simulate, options):
-    with pytest.raises(ValueError, match="leave"):
+    with pytest.raises(ValueError, match="together"):
         for_engine(simulate, **options)
 
 
