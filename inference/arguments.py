@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from inspect import signature
 from operator import index
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -166,7 +166,7 @@ def checked_mapping(name: str, value: object, due: str) -> dict[str, Any]:
         return {}
     fits = isinstance(value, Mapping) and all(isinstance(key, str) for key in value)
     require(fits, name, f"map names to {due}, or be None", value)
-    return dict(value)  # pyright: ignore[reportArgumentType, reportCallIssue]  it fits
+    return dict(cast(Mapping[str, Any], value))
 
 
 def check_called(name: str, value: Any, *arguments: str) -> None:

@@ -129,8 +129,9 @@ def told_signals(
         told = [_signal_or_fault(row, shape) for row in listed]
         if all(isinstance(one, str) for one in told):
             rows = f"({n}, ...)" if shape is None else (n, *shape)
+            got = f"{given!r:.100}" if error.shape is None else error.shape
             raise ValueError(
-                f"signals must be numbers of shape {rows}, one row per theta, got {error.got}"
+                f"signals must be numbers of shape {rows}, one row per theta, got {got}"
             ) from error
     faults = [
         unusable(f"{one} was told, {due} is due") if isinstance(one, str) else None for one in told

@@ -161,6 +161,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
         check_function("simulate", simulate)
     simulator = for_engine(simulate, vectorised, together, time_limit)
     told = _length(checked_prior(prior), earlier)
+    due = f"hold {MOST_SIMULATIONS - budget} simulations at most with budget={budget}"
+    require(budget + told <= MOST_SIMULATIONS, "earlier", due, told, "leave the least useful out")
     if initial is None:
         initial = max(MIN_LEARN, min(start_size(len(prior)), budget + told))
     engine = Bolfi(
@@ -179,16 +181,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
         engine.recipe = Recipe(simulator, identity, budget, own, fit, _check, _criticise)
     if earlier is not None:
         engine.tell(*earlier)
-    if budget + told > MOST_SIMULATIONS:
-        raise ValueError(
-            f"budget={budget} and {told} simulations in earlier are more than the "
-            f"{MOST_SIMULATIONS} that a run may have; leave the least useful out"
-        )
-    if budget + told < engine.initial:
-        raise ValueError(
-            f"budget={budget} is smaller than the start design of initial={engine.initial} points; "
-            "raise budget or lower initial"
-        )
+    due = f"reach the start design of initial={engine.initial} points"
+    require(budget + told >= engine.initial, "budget", due, budget, "raise budget or lower initial")
     with ExitStack() as stack:
         compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         advance = stack.enter_context(progress_bar("simulations", budget + confirm, shown=progress))
