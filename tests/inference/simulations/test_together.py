@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
 from bolfi_liquids.inference.simulations import BatchSimulator, Compute, Job, run_missing
-from bolfi_liquids.inference.simulations.job import for_engine, run_batch
+from bolfi_liquids.inference.simulations.job import run_batch
 
 
 class Marching:
@@ -33,12 +33,11 @@ def run(simulator, count, pool):
     return found
 
 
-@pytest.mark.parametrize(("count", "calls"), [(10, [4, 4, 2]), (8, [4, 4]), (5, [4, 1]), (2, [2])])
-def test_calls_are_as_large_as_the_simulator_likes(count, calls):
+def test_calls_are_as_large_as_the_simulator_likes():
     with ThreadPoolExecutor(2) as pool:
-        found = run(Marching(), count, pool)
-    assert [one.signal[0] for one in found] == list(range(count))
-    assert [one.signal[1] for one in found] == [size for size in calls for _ in range(size)]
+        found = run(Marching(), 10, pool)
+    assert [one.signal[0] for one in found] == list(range(10))
+    assert [one.signal[1] for one in found] == [4.0] * 8 + [2.0] * 2
 
 
 def test_a_run_that_fails_costs_only_itself():
@@ -47,33 +46,6 @@ def test_a_run_that_fails_costs_only_itself():
     assert [one.signal is None for one in found] == [seed == 2 for seed in range(8)]
     assert "went wrong" in found[2].error.text
     assert [one.signal[1] for one in found if one.signal is not None] == [1.0] * 3 + [4.0] * 4
-
-
-@pytest.mark.parametrize("together", [0, 2.5, "four"])
-def test_what_is_no_number_of_simulations_is_refused(together):
-    with pytest.raises(ValueError, match="together"):
-        BatchSimulator(Marching().simulate, together)
-
-
-@pytest.mark.parametrize(
-    ("simulate", "options"),
-    [
-        (Marching().simulate, {"vectorised": False, "together": 4}),
-        (Marching().simulate, {"vectorised": False, "together": "four"}),
-        (BatchSimulator(Marching().simulate), {"together": "four"}),
-        (BatchSimulator(Marching().simulate), {"time_limit": max}),
-        (BatchSimulator(Marching().simulate), {"vectorised": False}),
-    ],
-)
-def test_what_contradicts_a_simulator_is_refused(simulate, options):
-    with pytest.raises(ValueError, match="together"):
-        for_engine(simulate, **options)
-
-
-@pytest.mark.parametrize("neutral", [3, "drag", ["drag"]])
-def test_neutral_values_without_names_are_refused(neutral):
-    with pytest.raises(ValueError, match="neutral"):
-        BatchSimulator(Marching().simulate, neutral=neutral)
 
 
 def test_a_call_may_take_as_many_times_as_long_as_it_makes_simulations():
