@@ -58,15 +58,6 @@ def test_told_in_any_order_and_from_elsewhere(prior, observed, simulate):
 
 
 @pytest.mark.slow
-def test_foreign_simulations_replace_the_start_design(prior, observed, simulate):
-    engine = inference.Bolfi(prior, observed, initial=8)
-    own = prior.sample(jax.random.key(0), 12)
-    engine.tell(own, simulate(own, np.arange(12)))
-    start = inference.Bolfi(prior, observed, initial=8).ask(1)
-    assert engine.ask(1)["slope"] != start["slope"]
-
-
-@pytest.mark.slow
 def test_a_copy_teaches_nothing(prior, observed, simulate):
     """Copies have equal theta, seed and signal; a replicate, or a run of unknown seed, is none."""
     engine, plain = inference.Bolfi(prior, observed), inference.Bolfi(prior, observed)
@@ -160,19 +151,6 @@ def test_an_acquisition_is_called_in_float64(prior, observed, simulate):
 
     inference.fit(simulate, prior, observed, budget=6, initial=4, batch=2, acquisition=acquire)
     assert seen == [np.float64]
-
-
-@pytest.mark.slow
-def test_a_discrepancy_may_compare_unlike_shapes(prior):
-    engine = inference.Bolfi(
-        prior, [0.5], discrepancy=lambda seen, runs: float(abs(runs.mean() - seen[0]))
-    )
-    theta = engine.ask(6)
-    engine.tell(theta, np.full((6, 1), np.nan))  # failed runs fix no shape
-    theta = engine.ask(6)
-    engine.tell(theta, theta["offset"][:, None, None] + np.zeros((6, 4, 3)))
-    assert engine.fit(warn=False).closest.signal.shape == (4, 3)
-    assert engine.told == 12
 
 
 @pytest.mark.parametrize(

@@ -77,18 +77,6 @@ def test_earlier_simulations_count_beside_the_budget(prior, observed, simulate):
     np.testing.assert_array_equal(fit.history.theta[10:], first)
 
 
-def test_a_bank_s_simulations_serve_as_earlier_ones(prior, observed, simulate):
-    with inference.SimulationBank() as bank:
-        first = inference.fit(simulate, prior, observed, budget=8, bank=bank, identity="line")
-        kept = bank.simulations("line")
-    again = inference.fit(None, prior, observed, budget=0, earlier=kept)
-    order = np.argsort(first.history.seeds), np.argsort(again.history.seeds)
-    for name in ("theta", "signals", "seeds"):
-        both = (getattr(fit.history, name) for fit in (first, again))
-        left, right = (rows[rank] for rows, rank in zip(both, order, strict=True))
-        np.testing.assert_array_equal(left, right)
-
-
 def test_another_simulators_signals_in_a_bank_are_refused(tmp_path, prior, observed, simulate):
     path = tmp_path / "b.sqlite"
     inference.fit(simulate, prior, observed, budget=7, bank=path)

@@ -19,19 +19,6 @@ BOOM = raised(OSError("boom"))
 THETA = {"b": 0.1 + 0.2, "a": 1e-3}
 
 
-WRITE_50 = """
-import sys
-import numpy as np
-from bolfi_liquids import inference
-from bolfi_liquids.inference import simulations
-
-path, first = sys.argv[1], int(sys.argv[2])
-with inference.SimulationBank(path) as bank:
-    for seed in range(first, first + 50):
-        bank.put("id", {"a": 1.0}, seed, simulations.Simulation(np.zeros(3), None, 0.0))
-"""
-
-
 def test_keeps_signals_exactly(tmp_path):
     signal = np.random.default_rng(0).normal(size=(5, 2)).astype(np.float32)
     with inference.SimulationBank(tmp_path / "b.sqlite") as bank:
@@ -61,17 +48,6 @@ def test_keeps_failures_until_a_signal_comes_and_then_that():
         kept = bank.get("id", THETA, 0)
         assert kept is not None and kept.error is None
         np.testing.assert_array_equal(kept.signal, np.full(2, 1.0))
-
-
-def test_processes_may_share_a_file(tmp_path):
-    path = tmp_path / "shared.sqlite"
-    workers = [
-        subprocess.Popen([sys.executable, "-c", WRITE_50, str(path), first])
-        for first in ("0", "25")
-    ]
-    assert [worker.wait() for worker in workers] == [0, 0]
-    with inference.SimulationBank(path) as bank:
-        assert len(bank) == 75
 
 
 def test_other_files_are_refused_and_left_alone(tmp_path):

@@ -88,10 +88,10 @@ def assert_same(fit, other):
 
 @pytest.mark.slow
 def test_threads_that_finish_out_of_order(prior, observed, simulate, by_hand):
-    for _ in range(3):
-        with ThreadPoolExecutor(3) as pool:
-            fit = inference.fit(dithering(simulate), prior, observed, **options(pool))
-        assert_same(fit, by_hand)
+    with ThreadPoolExecutor(3) as pool:
+        for executor in (pool, pool, None):
+            fit = inference.fit(dithering(simulate), prior, observed, **options(executor))
+            assert_same(fit, by_hand)
 
 
 @pytest.mark.slow
@@ -129,35 +129,15 @@ def options(executor):
 
 
 @pytest.mark.slow
-def test_one_in_flight_is_one_per_round(prior, observed, simulate):
-    given = {"budget": 7, "initial": 5, "batch": 1}
-    plain = inference.fit(simulate, prior, observed, **given)
-    with ThreadPoolExecutor(2) as pool:
-        spread = inference.fit(simulate, prior, observed, executor=pool, in_rounds=False, **given)
-    assert_same(plain, spread)
-
-
-@pytest.mark.slow
 def test_an_executor_has_the_bits_of_none(prior, observed, simulate):
     given = {"budget": 8, "initial": 5, "batch": 3}
     plain = inference.fit(simulate, prior, observed, **given)
-    with ThreadPoolExecutor(3) as pool:
-        spread = inference.fit(dithering(simulate), prior, observed, executor=pool, **given)
-    assert_same(plain, spread)
-
-
-@pytest.mark.slow
-def test_in_flight_no_executor_has_the_bits_of_one(prior, observed, simulate, by_hand):
-    assert_same(inference.fit(simulate, prior, observed, **options(None)), by_hand)
-
-
-@pytest.mark.slow
-def test_progress_is_told_of_every_simulation(prior, observed, simulate):
     told = []
-    inference.fit(
-        simulate, prior, observed, budget=7, initial=5, batch=2, confirm=0, progress=told.append
-    )
-    assert told == [1] * 7
+    with ThreadPoolExecutor(3) as pool:
+        given |= {"executor": pool, "progress": told.append}
+        spread = inference.fit(dithering(simulate), prior, observed, **given)
+    assert_same(plain, spread)
+    assert told == [1] * len(spread.history.theta)
 
 
 def test_keeps_batch_in_flight_and_no_more(prior, observed, simulate):

@@ -61,18 +61,6 @@ def test_a_batch_has_the_time_of_all_and_then_each_its_own(forever):
     np.testing.assert_array_equal(found[3].signal, [3.0])
 
 
-def test_a_slow_batch_is_no_failure():
-    """Four runs of 0.2 s in one call, with 0.6 s for each."""
-
-    def simulate(theta, seeds):
-        time.sleep(0.2 * len(seeds))
-        return theta["a"][:, None]
-
-    found = run_batch(simulate, JOBS, (1,), 0.6)
-    assert all(result.error is None for result in found)
-    assert 0.8 <= sum(result.seconds for result in found) < 10.0
-
-
 @pytest.mark.parametrize(
     ("error", "timeout"),
     [(ValueError("bad"), None), (TimeoutError("of its own"), 30.0), (SystemExit(3), 30.0)],

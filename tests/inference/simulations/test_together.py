@@ -1,12 +1,9 @@
 """On an executor, a simulator that asks for it gets several simulations in a call."""
 
-import importlib
-import multiprocessing
 import time
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-import pytest
 from bolfi_liquids.inference import SimulationBank
 from bolfi_liquids.inference.simulations import BatchSimulator, Compute, Job, run_missing
 from bolfi_liquids.inference.simulations.job import run_batch
@@ -67,51 +64,6 @@ def test_a_call_may_take_as_many_times_as_long_as_it_makes_simulations():
         late = run_missing(four, jobs, kept, (1,), identity="short")
         assert all("no signal after" in one.error.text for one in late)
         assert calls == [4, 4, 1, 1, 1, 1]
-
-
-MORTAL = """
-import os
-import numpy as np
-
-class Mortal:
-    def __init__(self, made, mended):
-        self.made, self.mended = made, mended
-
-    def __call__(self, theta, seeds):
-        if 9 in seeds and not os.path.exists(self.mended):
-            os._exit(1)
-        with open(self.made, "a") as file:
-            file.write("".join(f"{seed}\\n" for seed in seeds))
-        return np.array(seeds, float)[:, None]
-"""
-
-
-@pytest.mark.slow
-def test_a_worker_that_is_killed_loses_its_call_and_what_was_stored_is_not_repeated(
-    tmp_path, monkeypatch
-):
-    (tmp_path / "mortal.py").write_text(MORTAL)
-    monkeypatch.syspath_prepend(tmp_path)
-    made, mended = tmp_path / "made", tmp_path / "mended"
-    simulate = BatchSimulator(importlib.import_module("mortal").Mortal(str(made), str(mended)), 4)
-    jobs = [Job({"a": 1.0}, seed) for seed in range(12)]
-
-    def run_all():
-        spawn = multiprocessing.get_context("spawn")
-        with (
-            SimulationBank(tmp_path / "bank.sqlite") as bank,
-            ProcessPoolExecutor(1, mp_context=spawn) as pool,
-        ):
-            return run_missing(simulate, jobs, Compute(bank=bank, executor=pool), (1,))
-
-    with pytest.raises(RuntimeError, match="lost its workers"):
-        run_all()
-    with SimulationBank(tmp_path / "bank.sqlite") as bank:
-        stored = set(bank.simulations("").seeds)
-    assert stored == set(range(8))
-    mended.touch()
-    assert [one.signal[0] for one in run_all()] == list(range(12))
-    assert sorted(map(int, made.read_text().split())) == list(range(12))
 
 
 class Told:
