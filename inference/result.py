@@ -348,7 +348,7 @@ class Fit(Displayed):
 
         Returns:
             DataTree in ArviZ's schema, draws in the parameters' own units, with R-hat, effective
-            sample sizes and Monte Carlo errors; `inference.arviz_tree` describes its groups and
+            sample sizes and Monte Carlo errors; `inference.result` describes its groups and
             attributes. Opens in ArviZ 0.23 and 1.x, also from `to_netcdf`.
 
         Raises:

@@ -2,9 +2,7 @@
 
 import contextlib
 import importlib
-import json
 import multiprocessing
-import random
 import sys
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -284,19 +282,6 @@ def test_another_simulator_s_signal_in_the_bank_costs_itself_alone():
     assert "(9,)" in str(found[3].error)
 
 
-def test_a_simulator_of_single_runs_gets_python_s_own_numbers():
-    got = []
-
-    def simulate(theta, seed):
-        random.seed(seed)
-        json.dumps({"seed": seed, **theta})
-        got.append(type(seed))
-        return [random.random()]
-
-    run_missing(OneByOne(simulate), JOBS, Compute(batch=4), (1,))
-    assert got == [int] * len(JOBS)
-
-
 def test_a_bad_signal_among_those_that_are_told_is_a_failed_run(prior, observed, simulate):
     engine = inference.Bolfi(prior, observed)
     theta = engine.ask(6)
@@ -319,30 +304,6 @@ def test_a_discrepancy_that_is_no_real_number_is_refused(prior, observed, simula
 def draws_of_prior(observed, seed):
     rng = np.random.default_rng(seed)
     return {"slope": rng.uniform(-1.0, 1.0, 31), "offset": rng.random(31)}
-
-
-def test_a_replicate_whose_data_are_none_costs_itself_alone(tmp_path, prior, simulate):
-    calls = []
-
-    def spoilt(theta, seeds):
-        calls.append(seeds)
-        return None if len(calls) in (1, 3) else simulate(theta, seeds)
-
-    options = {"draws": 15, "independent": True, "progress": False}
-    made = inference.replicates(draws_of_prior, spoilt, prior, 6, **options)
-    assert [one.number for one in made.failed] == [0, 2] and len(made.finished) == 4
-    assert all(str(int(calls[one.number][0])) in str(one.error) for one in made.failed)
-    options["store"] = tmp_path / "kept.sqlite"
-    licence = tmp_path / "licence"
-
-    def licensed(theta, seeds):
-        return simulate(theta, seeds) if licence.exists() else None
-
-    with pytest.raises(ValueError, match="got None"):
-        inference.replicates(draws_of_prior, licensed, prior, 6, **options)
-    licence.touch()
-    mended = inference.replicates(draws_of_prior, licensed, prior, 6, **options)
-    assert not mended.failed  # what failed in this way was not kept
 
 
 def test_observations_of_replicates_are_numbers_by_the_same_rules(prior, simulate):

@@ -1,6 +1,5 @@
 """On an executor, a simulator that asks for it gets several simulations in a call."""
 
-import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -43,27 +42,6 @@ def test_a_run_that_fails_costs_only_itself():
     assert [one.signal is None for one in found] == [seed == 2 for seed in range(8)]
     assert "went wrong" in found[2].error.text
     assert [one.signal[1] for one in found if one.signal is not None] == [1.0] * 3 + [4.0] * 4
-
-
-def test_a_call_may_take_as_many_times_as_long_as_it_makes_simulations():
-    """Four that sleep .25 s each: a call that is given less is repeated one by one."""
-    calls = []
-
-    def sleepy(theta, seeds):
-        calls.append(len(seeds))
-        time.sleep(0.25 * len(seeds))
-        return seeds[:, None].astype(float)
-
-    four = BatchSimulator(sleepy, 4)
-    jobs = [Job({"a": 1.0}, seed) for seed in range(4)]
-    with SimulationBank() as bank, ThreadPoolExecutor(1) as pool:
-        kept = Compute(bank=bank, executor=pool, timeout=0.6)
-        assert all(one.error is None for one in run_missing(four, jobs, kept, (1,)))
-        assert calls == [4]
-        kept = Compute(bank=bank, executor=pool, timeout=0.05)
-        late = run_missing(four, jobs, kept, (1,), identity="short")
-        assert all("no signal after" in one.error.text for one in late)
-        assert calls == [4, 4, 1, 1, 1, 1]
 
 
 class Told:
