@@ -61,6 +61,20 @@ def test_a_batch_has_the_time_of_all_and_then_each_its_own(forever):
     np.testing.assert_array_equal(found[3].signal, [3.0])
 
 
+def test_a_slow_batch_is_no_failure():
+    """Four runs of 0.1 s in one call, with 0.3 s for each."""
+
+    def simulate(theta, seeds):
+        calls.append(len(seeds))
+        time.sleep(0.1 * len(seeds))
+        return theta["a"][:, None]
+
+    calls = []
+    found = run_batch(simulate, JOBS, (1,), 0.3)
+    assert calls == [4] and all(result.error is None for result in found)
+    assert 0.4 <= sum(result.seconds for result in found) < 10.0
+
+
 @pytest.mark.parametrize(
     ("error", "timeout"),
     [(ValueError("bad"), None), (TimeoutError("of its own"), 30.0), (SystemExit(3), 30.0)],
