@@ -2,8 +2,7 @@
 the like; the caller's global settings stay as they were."""
 
 import functools
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from threading import Lock
 from typing import Any
 
@@ -36,21 +35,18 @@ def in_float64[**P, R](function: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(function)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
-        with jax.enable_x64(True), _jax_defaults(), np.errstate(**NUMPY_DEFAULTS), _one_blas_thread:
+        with (
+            jax.enable_x64(True),
+            jax.numpy_rank_promotion("allow"),
+            jax.numpy_dtype_promotion("standard"),
+            jax.debug_nans(False),
+            jax.debug_infs(False),
+            np.errstate(**NUMPY_DEFAULTS),
+            _one_blas_thread,
+        ):
             return function(*args, **kwargs)
 
     return wrapped
-
-
-@contextmanager
-def _jax_defaults() -> Iterator[None]:
-    with (
-        jax.numpy_rank_promotion("allow"),
-        jax.numpy_dtype_promotion("standard"),
-        jax.debug_nans(False),
-        jax.debug_infs(False),
-    ):
-        yield
 
 
 class _OneBlasThread:

@@ -7,11 +7,12 @@ import math
 from collections.abc import Callable, Mapping
 from inspect import signature
 from operator import index
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 LARGEST_INTEGER = 2**31 - 1  # that every random number generator takes as a seed
+LARGEST_INT64 = 2**63 - 1
 NUMBERS = "biufV"  # kinds of dtypes that become float64; V is bfloat16 and its like
 
 
@@ -101,91 +102,25 @@ def described(value: object) -> str:
     return f"an object of type {kind}"
 
 
+def require(fits: object, name: str, due: str, got: object, cure: str = "") -> None:
+    """Raise ValueError, "{name} must {due}, got {got}; {cure}", unless it fits."""
+    if not fits:
+        raise ValueError(f"{name} must {due}, got {got!r:.100}{cure and f'; {cure}'}")
+
+
 def checked_integer(name: str, value: object, least: int = 1, most: int = LARGEST_INTEGER) -> int:
     """`value`, an integer of any library, as Python's own.
 
     Raises:
         ValueError: not an integer, or not from `least` to `most`.
     """
-    refusal = f"{name} must be an integer from {least} to {most}, got {value!r:.100}"
     try:
         number = index(value)  # pyright: ignore[reportArgumentType]  or TypeError
-    except TypeError as error:
-        raise ValueError(refusal) from error
-    if isinstance(value, bool) or not least <= number <= most:
-        raise ValueError(refusal)
+    except TypeError:
+        number = least - 1
+    fits = not isinstance(value, bool) and least <= number <= most
+    require(fits, name, f"be an integer from {least} to {most}", value)
     return number
-
-
-def checked_array(name: str, value: object) -> np.ndarray:
-    """`value` as float64, by the rules of `float64`.
-
-    Raises:
-        ValueError: not numbers, or not of one shape.
-    """
-    try:
-        return float64(value)
-    except Unusable as error:
-        raise ValueError(f"{name} must be an array of numbers, got {value!r:.100}") from error
-
-
-def check_called(name: str, value: Any, *arguments: str) -> None:
-    """Raise ValueError unless `value` can be called with so many arguments, by position."""
-    try:
-        called = signature(value)
-    except (TypeError, ValueError):  # of compiled code
-        return
-    try:
-        called.bind(*arguments)
-    except TypeError as error:
-        raise ValueError(
-            f"{name} must be called with ({', '.join(arguments)}), got {value!r:.100}, which is "
-            f"called with {called}"
-        ) from error
-
-
-def _check(name: str, value: object, fits: object, due: str) -> None:
-    if not fits:
-        raise ValueError(f"{name} must be {due}, got {value!r:.100}")
-
-
-def check_timeout(timeout: float | None) -> None:
-    """Raise ValueError unless `timeout` is a positive and finite number of seconds, or None."""
-    number = isinstance(timeout, int | float) and not isinstance(timeout, bool)
-    fits = timeout is None or (number and 0 < timeout < math.inf)
-    _check("timeout", timeout, fits, "positive and finite [s], or None")
-
-
-def check_progress(progress: object) -> None:
-    """Raise ValueError unless `progress` is True, False or a function."""
-    fits = isinstance(progress, bool) or callable(progress)
-    _check("progress", progress, fits, "True, False or a function of a count")
-
-
-def check_flag(name: str, value: object) -> None:
-    """Raise ValueError unless `value` is True or False."""
-    _check(name, value, isinstance(value, bool | np.bool_), "True or False")
-
-
-def check_text(name: str, value: object) -> None:
-    """Raise ValueError unless `value` is text."""
-    _check(name, value, isinstance(value, str), "text")
-
-
-def check_function(name: str, value: object) -> None:
-    """Raise ValueError unless `value` is a function."""
-    _check(name, value, callable(value), "a function")
-
-
-def check_callable(name: str, value: object) -> None:
-    """Raise ValueError unless `value` is a function or None."""
-    _check(name, value, value is None or callable(value), "a function or None")
-
-
-def check_choice(name: str, value: object, choices: tuple[str | None, ...]) -> None:
-    """Raise ValueError unless `value` is one of `choices`, texts or None."""
-    fits = isinstance(value, str | None) and value in choices
-    _check(name, value, fits, f"one of {choices}")
 
 
 def checked_number(name: str, value: object, fits: Callable[[float], bool], due: str) -> float:
@@ -205,8 +140,20 @@ def checked_number(name: str, value: object, fits: Callable[[float], bool], due:
     except Unusable:
         array = np.array(math.nan)
     number = float(array) if array.shape == () else math.nan
-    _check(name, value, not math.isnan(number) and fits(number), due)
+    require(not math.isnan(number) and fits(number), name, f"be {due}", value)
     return number
+
+
+def checked_array(name: str, value: object) -> np.ndarray:
+    """`value` as float64, by the rules of `float64`.
+
+    Raises:
+        ValueError: not numbers, or not of one shape.
+    """
+    try:
+        return float64(value)
+    except Unusable as error:
+        raise ValueError(f"{name} must be an array of numbers, got {value!r:.100}") from error
 
 
 def checked_mapping(name: str, value: object, due: str) -> dict[str, Any]:
@@ -217,21 +164,72 @@ def checked_mapping(name: str, value: object, due: str) -> dict[str, Any]:
     """
     if value is None:
         return {}
-    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
-        raise ValueError(f"{name} must map names to {due}, or be None, got {value!r:.100}")
-    return dict(value)
+    fits = isinstance(value, Mapping) and all(isinstance(key, str) for key in value)
+    require(fits, name, f"map names to {due}, or be None", value)
+    return dict(cast(Mapping[str, Any], value))
+
+
+def check_called(name: str, value: Any, *arguments: str) -> None:
+    """Raise ValueError unless `value` can be called with so many arguments, by position."""
+    try:
+        called = signature(value)
+    except (TypeError, ValueError):  # of compiled code
+        return
+    try:
+        called.bind(*arguments)
+    except TypeError as error:
+        raise ValueError(
+            f"{name} must be called with ({', '.join(arguments)}), got {value!r:.100}, which is "
+            f"called with {called}"
+        ) from error
+
+
+def check_kind(name: str, value: object, kind: Any) -> None:
+    """Raise ValueError unless `value` is of a kind, or of one of a union of kinds."""
+    require(
+        isinstance(value, kind), name, f"be of the type {getattr(kind, '__name__', kind)}", value
+    )
+
+
+def check_timeout(timeout: float | None) -> None:
+    """Raise ValueError unless `timeout` is a positive and finite number of seconds, or None."""
+    number = isinstance(timeout, int | float) and not isinstance(timeout, bool)
+    fits = timeout is None or (number and 0 < timeout < math.inf)
+    require(fits, "timeout", "be positive and finite [s], or None", timeout)
+
+
+def check_progress(progress: object) -> None:
+    """Raise ValueError unless `progress` is True, False or a function."""
+    fits = isinstance(progress, bool) or callable(progress)
+    require(fits, "progress", "be True, False or a function of a count", progress)
+
+
+def check_flag(name: str, value: object) -> None:
+    """Raise ValueError unless `value` is True or False."""
+    require(isinstance(value, bool | np.bool_), name, "be True or False", value)
+
+
+def check_text(name: str, value: object) -> None:
+    """Raise ValueError unless `value` is text."""
+    require(isinstance(value, str), name, "be text", value)
+
+
+def check_function(name: str, value: object) -> None:
+    """Raise ValueError unless `value` is a function."""
+    require(callable(value), name, "be a function", value)
+
+
+def check_callable(name: str, value: object) -> None:
+    """Raise ValueError unless `value` is a function or None."""
+    require(value is None or callable(value), name, "be a function or None", value)
+
+
+def check_choice(name: str, value: object, choices: tuple[str | None, ...]) -> None:
+    """Raise ValueError unless `value` is one of `choices`, texts or None."""
+    fits = isinstance(value, str | None) and value in choices
+    require(fits, name, f"be one of {choices}", value)
 
 
 def is_table(value: object) -> bool:
     """Whether `value` has columns by name: a mapping, a data frame, a dataset."""
     return hasattr(value, "keys") and hasattr(value, "__getitem__")
-
-
-def check_kind(name: str, value: object, kind: Any) -> None:
-    """Raise ValueError unless `value` is of a kind, or of one of a union of kinds."""
-    if not isinstance(value, kind):
-        due = getattr(kind, "__name__", str(kind))
-        raise ValueError(
-            f"{name} must be of the type {due}, got {value!r:.100} of the type "
-            f"{type(value).__name__}"
-        )

@@ -13,28 +13,17 @@ from scipy.special import ndtr
 from ._float64 import in_float64
 from .acquisition.replicates import next_replicate
 from .acquisition.rules import chosen, resolve_acquisition
-from .arguments import Unusable, check_flag, checked_integer, checked_mapping
+from .arguments import check_flag, checked_integer, checked_mapping, require
 from .describe import describe
-from .history import (
-    UNKNOWN,
-    History,
-    explain,
-    init,
-    outputs_of,
-    remember_asked,
-    remember_told,
-    told_errors,
-    told_seeds,
-)
+from .history import UNKNOWN, History, told_errors, told_seeds, told_signals
 from .notebook_display import Displayed
 from .prior import Prior, check_support, checked_prior
 from .result import Fit, Recipe
 from .sampling.confirmation import Before
-from .simulations.failures import Failure, FailureKind, unusable
+from .simulations.failures import Failure, FailureKind, not_finite
 from .simulations.job import BATCH
-from .simulations.returned import told_signals
 from .sobol import sobol, start_size
-from .surrogates.base import Acquisition, Family, Measured, RunOutcomes, TrainingData
+from .surrogates.base import Acquisition, Family, RunOutcomes, TrainingData
 from .surrogates.discrepancy import is_outlier
 from .surrogates.families import checked_surrogate, resolve
 from .surrogates.warnings import complain
@@ -63,6 +52,11 @@ class Bolfi(Displayed):
         initial: Points of the Sobol start design; None is 2 d + 6.
         options: Of the surrogate's family, see `SignalFamily` and `DiscrepancyFamily`.
 
+    Attributes:
+        asked: Points asked so far.
+        history: Simulations told so far; telling more replaces it.
+        expected_shape: Of a signal; None where a user's discrepancy or summary takes any.
+
     Raises:
         ValueError: an argument is not one of the above.
     """
@@ -90,17 +84,21 @@ class Bolfi(Displayed):
             MIN_LEARN,
             MOST_SIMULATIONS,
         )
-        name = self.family.name or type(self.family).__name__
         self._acquire = resolve_acquisition(acquisition, self.family)
         self.settings: dict[str, object] = {
-            "surrogate": name,
+            "surrogate": self.family.name or type(self.family).__name__,
             **{name: describe(value) for name, value in vars(self.family).items()},
             "acquisition": describe(self._acquire),
             "seed": self.seed,
             "initial": self.initial,
         }
-        features = self.family.measure(self._view, []).features
-        self._state = init(len(prior), self.observed.shape, features)
+        self.expected_shape = None if self.family.any_shape else self.observed.shape
+        self.history = self._history(np.zeros((0, len(prior))), (), told_seeds(None, 0), [])
+        self.asked = 0
+        self._designed = 0  # points asked of the start design's sequence
+        self._rounds = 0  # calls of `ask` and `confirm`
+        self._pending: list[list[float]] = []  # theta asked and not yet told
+        self._pending_rounds: list[int] = []
         self._learned: Any = None  # the family's surrogate, once there is one
         self._before: Before | None = None  # the posterior of which `confirm` drew
         self._seconds = 0.0
@@ -108,9 +106,7 @@ class Bolfi(Displayed):
 
     def _shown(self) -> list[tuple[str, str]]:
         parameters = [f"{name} ~ {of['prior']}" for name, of in self.prior.describe().items()]
-        told = (
-            f"{self.told} told, {self.succeeded} to learn from, {len(self._state.pending)} pending"
-        )
+        told = f"{self.told} told, {self.succeeded} to learn from, {len(self._pending)} pending"
         return [
             ("parameters", ", ".join(parameters)),
             ("observed", f"shape {self.observed.shape}"),
@@ -118,11 +114,6 @@ class Bolfi(Displayed):
             ("surrogate", f"{self.settings['surrogate']!r}"),
             ("acquisition", f"{self.settings['acquisition']}"),
         ]
-
-    @property
-    def asked(self) -> int:
-        """Points asked so far."""
-        return self._state.asked
 
     @property
     def told(self) -> int:
@@ -133,16 +124,6 @@ class Bolfi(Displayed):
     def succeeded(self) -> int:
         """Simulations told so far that gave a finite discrepancy, copies counted once."""
         return int(self.history.distinct.sum())
-
-    @property
-    def history(self) -> History:
-        """Simulations told so far."""
-        return self._state.history
-
-    @property
-    def expected_shape(self) -> tuple[int, ...] | None:
-        """Of a signal; None where a user's discrepancy or summary takes signals of any shape."""
-        return None if self.family.any_shape else self.history.signal_shape
 
     def ask(self, n: int = 1) -> dict[str, np.ndarray]:
         """The next n different points to simulate, name -> [n].
@@ -156,16 +137,12 @@ class Bolfi(Displayed):
         n = checked_integer("n", n, 1, MOST_SIMULATIONS)
         started = time.perf_counter()
         designed = self._designed_now(n)
-        start = self._state.designed
-        u = sobol(self.seed, start, start + designed, len(self.prior))
+        u = sobol(self.seed, self._designed, self._designed + designed, len(self.prior))
         parts = [self.prior.to_array(self.prior.from_unit(u))]
         if n > designed:
             parts.append(self._acquired(n - designed, parts[0]))
-        asked = np.concatenate(parts)
-        self._state = remember_asked(self._state, asked, designed)
-        theta = self.prior.to_dict(asked)
-        self._seconds += time.perf_counter() - started
-        return theta
+        self._designed += designed
+        return self._ask(np.concatenate(parts), started)
 
     def confirm(self, fit: Fit, n: int = 3) -> dict[str, np.ndarray]:
         """Draws of a fit's posterior to simulate, name -> [n].
@@ -181,27 +158,34 @@ class Bolfi(Displayed):
             ValueError: bad argument.
         """
         n = checked_integer("n", n, 1, MOST_SIMULATIONS)
-        if not isinstance(fit, Fit) or fit.history is not self.history:
-            raise ValueError(f"fit must be what `fit` returned last, got {fit!r:.100}")
+        latest = isinstance(fit, Fit) and fit.history is self.history
+        require(latest, "fit", "be what `fit` returned last", fit)
         started = time.perf_counter()
         drawn = fit.population.resample(np.random.default_rng([self.seed, self.asked]), n)
         asked = self.prior.to_array(self.prior.from_unit(ndtr(drawn)))
         self._before = Before(*fit.population.moments, fit.learned, self.told, asked)
-        self._state = remember_asked(self._state, asked, 0)
+        return self._ask(asked, started)
+
+    def _ask(self, theta: np.ndarray, started: float) -> dict[str, np.ndarray]:
+        """theta [n, d] as it is asked, name -> [n]."""
+        self._pending += theta.tolist()
+        self._pending_rounds += [self._rounds] * len(theta)
+        self._rounds += 1
+        self.asked += len(theta)
         self._seconds += time.perf_counter() - started
-        return self.prior.to_dict(asked)
+        return self.prior.to_dict(theta)
 
     def _designed_now(self, n: int) -> int:
         """Number of the next n points that come from the start design."""
         if self.succeeded < MIN_LEARN:
             return n
-        covered = self.succeeded + len(self._state.pending)
+        covered = self.succeeded + len(self._pending)
         return min(n, max(0, self.initial - covered))
 
     @in_float64
     def _acquired(self, n: int, designed: np.ndarray) -> np.ndarray:
         """theta [n, d] of the engine's choice, `designed` [m, d] being asked with them."""
-        pending = np.concatenate([self._state.pending, designed])
+        pending = np.reshape(self._pending + designed.tolist(), (-1, len(self.prior)))
         words = self._words()
         found = self.family.search(self._training_data(), words, self._learned)
         self._learned = checked_surrogate(found, self.family)
@@ -217,7 +201,7 @@ class Bolfi(Displayed):
 
     def _words(self) -> np.ndarray:
         """A key of JAX as NumPy makes it: JAX would compile for half a second."""
-        return np.random.SeedSequence([self.seed, self._state.asked]).generate_state(2)
+        return np.random.SeedSequence([self.seed, self.asked]).generate_state(2)
 
     @property
     def _training_mask(self) -> np.ndarray:
@@ -259,70 +243,87 @@ class Bolfi(Displayed):
         """
         started = time.perf_counter()
         natural = np.atleast_2d(self.prior.to_array(theta))
-        if self.told + len(natural) > MOST_SIMULATIONS:
+        n = len(natural)
+        if self.told + n > MOST_SIMULATIONS:
             raise ValueError(
-                f"theta holds {len(natural)} simulations beside the {self.told} told before; a run "
-                f"may have {MOST_SIMULATIONS} in all: leave the least useful out"
+                f"theta holds {n} simulations beside the {self.told} told before; a run may have "
+                f"{MOST_SIMULATIONS} in all: leave the least useful out"
             )
-        rows = self.prior.to_dict(natural)
-        told_rows, faults = self._signals(len(natural), signals)
-        check_support(self.prior, rows)
-        given_seeds = told_seeds(seeds, len(natural))
-        measured = self.family.measure(self._view, told_rows)
-        measured = _located(measured, rows, given_seeds)
-        given_errors = told_errors(errors, np.isfinite(measured.discrepancy))
-        self._check_compared(measured)
-        known = [a or b or c for a, b, c in zip(faults, measured.errors, given_errors, strict=True)]
-        told = History(
-            theta=natural,
-            u=self.prior.to_unit(rows),
-            outputs=outputs_of(told_rows),
-            features=measured.features,
-            discrepancy=measured.discrepancy,
-            seeds=given_seeds,
-            rounds=np.full(len(natural), UNKNOWN),
-            why=explain(told_rows, measured.discrepancy, known),
-            observed_shape=self.observed.shape,
-        )
-        self._state = remember_told(self._state, told)
+        outputs, faults = told_signals(signals, n, self.expected_shape)
+        check_support(self.prior, self.prior.to_dict(natural))
+        told = self._history(natural, outputs, told_seeds(seeds, n), faults, errors)
+        self._check_compared(told)
+        self.history = self.history.and_then(told._replace(rounds=self._settled(natural)))
         self._seconds += time.perf_counter() - started
 
-    def _check_compared(self, measured: Measured) -> None:
+    def _history(
+        self,
+        theta: np.ndarray,
+        outputs: tuple[np.ndarray | None, ...],
+        seeds: np.ndarray,
+        faults: Sequence[Failure | None],
+        errors: Sequence[str | Failure | None] | None = None,
+    ) -> History:
+        """Simulations at theta [n, d] in view of what was observed, their rounds unknown.
+
+        Args:
+            outputs, seeds: See `History`.
+            faults: Why some outputs are no signals [n].
+            errors: As a user tells them.
+        """
+        rows = self.prior.to_dict(theta)
+        measured = self.family.measure(self._view, outputs)
+        good = np.isfinite(measured.discrepancy)
+        why = np.full(len(theta), None)
+        known = zip(faults, measured.errors, told_errors(errors, good), strict=True)
+        for i, (fault, compared, told) in enumerate(known):
+            if compared is not None:
+                point = {name: float(column[i]) for name, column in rows.items()}
+                run = f"{point}" if seeds[i] == UNKNOWN else f"{point}, seed {seeds[i]}"
+                compared = replace(compared, text=f"{compared.text} of {run}")
+            if not good[i]:
+                output = outputs[i]
+                finite = output is not None and np.isfinite(output).all()
+                blank = not_finite("the discrepancy" if finite else "the signal")
+                why[i] = fault or compared or told or blank
+        return History(
+            theta=theta,
+            u=self.prior.to_unit(rows),
+            outputs=outputs,
+            features=measured.features,
+            discrepancy=measured.discrepancy,
+            seeds=seeds,
+            rounds=np.full(len(theta), UNKNOWN),
+            why=why,
+            observed_shape=self.observed.shape,
+        )
+
+    def _settled(self, theta: np.ndarray) -> np.ndarray:
+        """Rounds [n] in which theta [n, d] was asked, which is no longer pending; UNKNOWN of what
+        was never asked: simulations made elsewhere are welcome."""
+        rounds = np.full(len(theta), UNKNOWN)
+        for row, point in enumerate(theta.tolist()):
+            if point in self._pending:
+                place = self._pending.index(point)
+                del self._pending[place]
+                rounds[row] = self._pending_rounds.pop(place)
+        return rounds
+
+    def _check_compared(self, told: History) -> None:
         """Raise ValueError if the user's own function failed on all of the first signals.
 
         One on which it fails is a failed run; where none of the first can be compared, all would
         fail in the same way.
         """
-        if self.succeeded or np.isfinite(measured.discrepancy).any():
+        if self.succeeded or told.succeeded.any():
             return
         failed = [
             failure
-            for failure in (*self.history.why, *measured.errors)
+            for failure in (*self.history.why, *told.why)
             if failure is not None and failure.kind is FailureKind.INCOMPARABLE
         ]
         if len(failed) >= BATCH:
             raise ValueError(failed[-1].text)
-
-    def _signals(
-        self, n: int, signals: ArrayLike
-    ) -> tuple[Sequence[np.ndarray | None], list[Failure | None]]:
-        """The n signals told, None where something else was, and what that was."""
-        shape = self.expected_shape
-        try:
-            rows, faults = told_signals(signals, n, shape)
-        except Unusable as error:
-            if error.shape is None:
-                raise ValueError(
-                    f"signals must be an array of numbers, got {signals!r:.100}"
-                ) from error
-            due = (n, *(error.shape[1:] if shape is None else shape))
-            raise ValueError(
-                f"signals must have shape {due}, one row per theta, got {error.shape}"
-            ) from error
-        due = "an array of numbers" if shape is None else shape
-        return rows, [
-            unusable(f"{fault} was told, {due} is due") if fault else None for fault in faults
-        ]
 
     def fit(
         self,
@@ -371,17 +372,3 @@ class Bolfi(Displayed):
         if warn:
             complain(made.warnings, stacklevel + 1)
         return made
-
-
-def _located(measured: Measured, theta: Mapping[str, np.ndarray], seeds: np.ndarray) -> Measured:
-    """The same, each failure naming its run: theta (name -> [n]) and seeds [n]."""
-
-    def run(i: int) -> str:
-        point = {name: float(column[i]) for name, column in theta.items()}
-        return f"{point}" if seeds[i] == UNKNOWN else f"{point}, seed {seeds[i]}"
-
-    errors = [
-        error and replace(error, text=f"{error.text} of {run(i)}")
-        for i, error in enumerate(measured.errors)
-    ]
-    return measured._replace(errors=errors)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._float64 import in_float64
-from .arguments import checked_array
+from .arguments import checked_array, require
 from .prior import Prior, check_support, checked_prior
 from .surrogates import emulator as vectors
 from .surrogates.emulator import Emulator, EmulatorLimits
@@ -54,19 +54,17 @@ def emulate(prior: Prior, theta: Theta, outputs: ArrayLike, scale: ArrayLike) ->
     rows = checked_prior(prior).to_dict(np.atleast_2d(prior.to_array(theta)))
     known, weights = checked_array("outputs", outputs), checked_array("scale", scale)
     n = len(next(iter(rows.values())))
-    if known.ndim != 2 or len(known) != n:
-        raise ValueError(f"outputs must have shape ({n}, m), a row per theta, got {known.shape}")
+    alike = known.ndim == 2 and len(known) == n
+    require(alike, "outputs", f"have shape ({n}, m), a row per theta", known.shape)
     finite = np.isfinite(known).all(axis=1)
-    if finite.sum() < MIN_VALUES:
-        raise ValueError(
-            f"outputs must be finite for {MIN_VALUES} theta, got {finite.sum()} of {n}; make more"
-        )
+    usable = int(finite.sum())
+    require(
+        usable >= MIN_VALUES, "outputs", f"be finite for {MIN_VALUES} theta", usable, "make more"
+    )
     check_support(prior, rows)
-    if weights.shape != known.shape[1:] or not (weights > 0.0).all():
-        raise ValueError(
-            f"scale must hold {known.shape[1]} positive numbers, one per output, got shape "
-            f"{weights.shape} and least {weights.min(initial=np.inf)}"
-        )
+    positive = weights.shape == known.shape[1:] and (weights > 0.0).all()
+    due = f"hold {known.shape[1]} positive numbers, one per output"
+    require(positive, "scale", due, weights)
     limits, u = EmulatorLimits(COMPONENTS, predicted=None), prior.to_unit(rows)[finite]
     learned = vectors.emulate(u, known[finite], lambda _: weights, limits, None, prior.normal)
     return Emulation(prior, learned)

@@ -1,13 +1,15 @@
-"""The value that ask and tell pass on: all that a run has asked and was told."""
+"""Simulations that were told, and the reading of what a user tells."""
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .simulations.failures import Failure, FailureKind, count, not_finite
-from .simulations.returned import commonest
+from .arguments import LARGEST_INT64, Unusable, checked_integer, float64, require
+from .simulations.failures import Failure, FailureKind, unusable
+from .simulations.job import commonest, signals_of
 
 UNKNOWN = -1  # seed or round of a simulation made elsewhere
 
@@ -75,6 +77,14 @@ class History(NamedTuple):
         """Theta and seed of a run, which should determine its signal."""
         return self.theta[row].tobytes(), int(self.seeds[row])
 
+    def and_then(self, later: "History") -> "History":
+        """These simulations and later ones."""
+        arrays = set(self._fields) - {"outputs", "observed_shape"}
+        joined = {
+            name: np.concatenate([getattr(self, name), getattr(later, name)]) for name in arrays
+        }
+        return self._replace(**joined, outputs=self.outputs + later.outputs)
+
     @property
     def errors(self) -> np.ndarray:
         """Why a run failed, in words, str [n]; "" where it succeeded."""
@@ -89,92 +99,60 @@ class History(NamedTuple):
     @property
     def failures(self) -> dict[str, int]:
         """Failed runs by `FailureKind`."""
-        return count(self.why)
+        return dict(Counter(one.kind.value for one in self.why if one is not None))
 
 
-class State(NamedTuple):
-    history: History
-    pending: np.ndarray  # [m, d], theta asked and not yet told
-    pending_rounds: np.ndarray  # int64 [m]
-    designed: int  # points of the start design's sequence already asked
-    asked: int  # points asked in all
-    rounds: int  # calls of ask
+def told_signals(
+    given: object, n: int, shape: tuple[int, ...] | None
+) -> tuple[tuple[np.ndarray | None, ...], list[Failure | None]]:
+    """n signals that a user tells, and why some are none.
 
+    Args:
+        given: An array, or a sequence of n signals, of which some may be bad.
+        n: Signals that are due.
+        shape: Of one signal; None accepts any, also one of each.
 
-def init(dimension: int, observed_shape: tuple[int, ...], features: np.ndarray) -> State:
-    """Nothing asked, nothing told: `features` [0, m]."""
-    rows, none = np.zeros((0, dimension)), np.zeros(0, np.int64)
-    history = History(
-        theta=rows,
-        u=rows,
-        outputs=(),
-        features=features,
-        discrepancy=np.zeros(0),
-        seeds=none,
-        rounds=none,
-        why=np.zeros(0, object),
-        observed_shape=observed_shape,
-    )
-    return State(history, rows, none, designed=0, asked=0, rounds=0)
+    Returns:
+        Signals of float64, read-only; None where something else came, and where one is NaN
+        throughout, the mark of a failed run. And the failures where something else came.
 
-
-def remember_asked(state: State, theta: np.ndarray, designed: int) -> State:
-    """The state after asking theta [n, d], of which `designed` came from the start design."""
-    n = len(theta)
-    return state._replace(
-        pending=np.concatenate([state.pending, theta]),
-        pending_rounds=np.append(state.pending_rounds, np.full(n, state.rounds)),
-        designed=state.designed + designed,
-        asked=state.asked + n,
-        rounds=state.rounds + 1,
-    )
-
-
-def remember_told(state: State, told: History) -> State:
-    """The state after telling rows, of which each settles at most one pending point.
-
-    Rows that were never asked are simulations made elsewhere and welcome; the rounds in
-    `told` are replaced by those in which its points were asked.
+    Raises:
+        ValueError: not n signals, or none of them can be used.
     """
-    pending, pending_rounds = state.pending, state.pending_rounds
-    rounds = np.full(len(told.theta), UNKNOWN)
-    for row, theta in enumerate(told.theta):
-        matches = np.flatnonzero((pending == theta).all(-1))
-        if matches.size:
-            rounds[row] = pending_rounds[matches[0]]
-            pending = np.delete(pending, matches[0], axis=0)
-            pending_rounds = np.delete(pending_rounds, matches[0])
-    merged = _merged(state.history, told._replace(rounds=rounds))
-    return state._replace(history=merged, pending=pending, pending_rounds=pending_rounds)
+    due = "an array of numbers" if shape is None else shape
+    try:
+        told: list[np.ndarray | str] = list(signals_of(given, n, shape)) if n else []
+    except Unusable as error:
+        if isinstance(given, np.ndarray) and given.dtype == object and given.ndim == 1:
+            given = given.tolist()
+        listed = given if isinstance(given, list | tuple) and len(given) == n else []
+        told = [_signal_or_fault(row, shape) for row in listed]
+        if all(isinstance(one, str) for one in told):
+            rows = f"({n}, ...)" if shape is None else (n, *shape)
+            got = f"{given!r:.100}" if error.shape is None else error.shape
+            raise ValueError(
+                f"signals must be numbers of shape {rows}, one row per theta, got {got}"
+            ) from error
+    faults = [
+        unusable(f"{one} was told, {due} is due") if isinstance(one, str) else None for one in told
+    ]
+    return tuple(map(_kept, told)), faults
 
 
-def _merged(old: History, new: History) -> History:
-    arrays = set(History._fields) - {"outputs", "observed_shape"}
-    columns = {name: np.concatenate([getattr(old, name), getattr(new, name)]) for name in arrays}
-    return old._replace(**columns, outputs=old.outputs + new.outputs)
+def _signal_or_fault(given: object, due: tuple[int, ...] | None) -> np.ndarray | str:
+    try:
+        row = float64(given)
+    except Unusable as bad:
+        return bad.got
+    return row if due in (None, row.shape) else str(row.shape)
 
 
-def outputs_of(signals: Sequence[np.ndarray | None]) -> tuple[np.ndarray | None, ...]:
-    """The same, None where a signal is NaN throughout, the mark of a failed run."""
-    return tuple(
-        None if signal is None or (signal.size and np.isnan(signal).all()) else signal
-        for signal in signals
-    )
-
-
-def explain(
-    signals: Sequence[np.ndarray | None],
-    discrepancy: np.ndarray,
-    known: Sequence[Failure | None],
-) -> np.ndarray:
-    """The Failure of each run, object [n]: what is known [n], else what is not finite; None where
-    the discrepancy is finite."""
-    why = np.full(len(signals), None)
-    for i in np.flatnonzero(~np.isfinite(discrepancy)).tolist():
-        signal = signals[i]
-        finite = signal is not None and bool(np.isfinite(signal).all())
-        why[i] = known[i] or not_finite("the discrepancy" if finite else "the signal")
-    return why
+def _kept(told: np.ndarray | str) -> np.ndarray | None:
+    if isinstance(told, str) or (told.size and np.isnan(told).all()):
+        return None
+    told = np.asarray(told).view()
+    told.flags.writeable = False
+    return told
 
 
 def told_seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:
@@ -185,22 +163,13 @@ def told_seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:
     """
     if seeds is None:
         return np.full(n, UNKNOWN)
-    refusal = f"seeds must be integers below 2^63, got {seeds!r:.100}"
-    try:
-        array = np.ma.asarray(seeds)
-        array = array.astype(np.int64) if array.size == 0 else array  # those of [] are floats
-    except (TypeError, ValueError) as error:
-        raise ValueError(refusal) from error
-    if array.shape != (n,):
-        raise ValueError(
-            f"seeds must have shape ({n},), one per theta, got {array.shape}: {seeds!r:.100}"
-        )
-    if np.ma.is_masked(array):
-        raise ValueError(f"seeds must not be masked, got {seeds!r:.100}; leave those runs out")
-    # a float would lose its fraction, or as a large number its last digits
-    if array.dtype.kind not in "iu" or (array > np.iinfo(np.int64).max).any():
-        raise ValueError(refusal)
-    return np.ma.getdata(array).astype(np.int64)
+    given = np.ma.asarray(seeds, object)
+    require(given.shape == (n,), "seeds", f"have shape ({n},), one per theta", seeds)
+    whole = [
+        checked_integer(f"seeds[{run}]", seed, -LARGEST_INT64 - 1, LARGEST_INT64)
+        for run, seed in enumerate(given)
+    ]
+    return np.array(whole, np.int64)
 
 
 def told_errors(
@@ -217,17 +186,12 @@ def told_errors(
     """
     n = len(succeeded)
     given = np.full(n, None) if errors is None else np.asarray(errors, object)
-    if given.shape != (n,):
-        raise ValueError(
-            f"errors must have shape ({n},), one per theta, got {given.shape}: {errors!r:.100}"
-        )
-    told = [_failure(one) for one in given]
+    require(given.shape == (n,), "errors", f"have shape ({n},), one per theta", errors)
+    told = list(map(_failure, given))
+    due = "be empty, for the signal of that run is finite"
     for run in np.flatnonzero(succeeded):
-        if told[run] is not None:
-            raise ValueError(
-                f"errors[{run}] is {str(told[run])!r:.100}, but the signal of that run is finite: "
-                'tell NaN in its place if the run failed, or the error ""'
-            )
+        cure = 'tell NaN in its place if the run failed, or the error ""'
+        require(told[run] is None, f"errors[{run}]", due, told[run], cure)
     return told
 
 

@@ -19,14 +19,14 @@ from .arguments import (
     checked_integer,
     checked_number,
     is_table,
+    require,
 )
 from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
-from .prior import Prior
+from .prior import Prior, checked_prior
 from .progress import progress_bar
 from .result import MUCH_DOUBT, Fit, Recipe
 from .simulations.bank import Simulation, SimulationBank
-from .simulations.compute import open_compute
-from .simulations.executors import Workers
+from .simulations.compute import Workers, open_compute
 from .simulations.job import (
     BATCH,
     Job,
@@ -34,7 +34,6 @@ from .simulations.job import (
     columns,
     for_engine,
     jobs,
-    of_one_shape,
     simulation_seed,
 )
 from .simulations.runner import Runner
@@ -161,13 +160,10 @@ def fit(  # noqa: PLR0913  the one call that most users make
     if budget or simulate is not None:
         check_function("simulate", simulate)
     simulator = for_engine(simulate, vectorised, together, time_limit)
-    told = _length(earlier)
-    if budget + told > MOST_SIMULATIONS:
-        raise ValueError(
-            f"earlier holds {told} simulations, which with budget={budget} is more than the "
-            f"{MOST_SIMULATIONS} that a run may have; leave the least useful out"
-        )
-    if initial is None and isinstance(prior, Prior):  # `Bolfi` refuses what is none
+    told = _length(checked_prior(prior), earlier)
+    due = f"hold {MOST_SIMULATIONS - budget} simulations at most with budget={budget}"
+    require(budget + told <= MOST_SIMULATIONS, "earlier", due, told, "leave the least useful out")
+    if initial is None:
         initial = max(MIN_LEARN, min(start_size(len(prior)), budget + told))
     engine = Bolfi(
         prior,
@@ -185,15 +181,12 @@ def fit(  # noqa: PLR0913  the one call that most users make
         engine.recipe = Recipe(simulator, identity, budget, own, fit, _check, _criticise)
     if earlier is not None:
         engine.tell(*earlier)
-    if budget + engine.told < engine.initial:
-        raise ValueError(
-            f"budget={budget} is smaller than the start design of initial={engine.initial} points; "
-            "raise budget or lower initial"
-        )
+    due = f"reach the start design of initial={engine.initial} points"
+    require(budget + told >= engine.initial, "budget", due, budget, "raise budget or lower initial")
     with ExitStack() as stack:
         compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         advance = stack.enter_context(progress_bar("simulations", budget + confirm, shown=progress))
-        runner = stack.enter_context(Runner(simulator, compute, identity))
+        runner = stack.enter_context(Runner(simulator, compute, engine.expected_shape, identity))
         schedule = _in_rounds if in_rounds else _in_flight
         finished = schedule(engine, runner, budget, batch)
         seconds = 0.0
@@ -265,27 +258,23 @@ def fit_losses(
     Warns:
         EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
     """
-    if (noise is None) == (n is None):
-        raise ValueError(
-            "give either noise=, the sd of the data's noise, or n=, the number of data in a loss, "
-            f"got noise={noise!r:.100} and n={n!r:.100}"
-        )
+    one = (noise is None) != (n is None)
+    due = "be one, the sd of the data's noise or the number of data in a loss"
+    require(one, "either noise= or n=", due, (noise, n))
     engine = Bolfi(prior, surrogate="log_likelihood", initial=MIN_LEARN)
     losses, m = checked_array("loss", loss), len(np.atleast_2d(prior.to_array(theta)))
-    if losses.shape != (m,):
-        raise ValueError(f"loss must have shape ({m},), one per theta, got {losses.shape}")
-    if np.isfinite(losses).sum() < MIN_LEARN:
-        raise ValueError(
-            f"loss must hold {MIN_LEARN} finite numbers, got {np.isfinite(losses).sum()} of {m}: "
-            "simulate more"
-        )
+    require(losses.shape == (m,), "loss", f"have shape ({m},), one per theta", losses.shape)
+    finite = int(np.isfinite(losses).sum())
+    require(
+        finite >= MIN_LEARN, "loss", f"hold {MIN_LEARN} finite numbers", finite, "simulate more"
+    )
     least = np.nanmin(losses, initial=np.inf)
-    if least < 0.0 or (least == 0.0 and noise is None):
-        raise ValueError(
-            f"loss must hold sums of squares, {'positive' if noise is None else 'from 0'}, got "
-            f"{least:.4g}: leave such trials out, give noise= for a perfect fit, or give minus a "
-            'log likelihood, its sign changed, to fit(surrogate="log_likelihood")'
-        )
+    due = f"hold sums of squares, {'positive' if noise is None else 'from 0'}"
+    cure = (
+        "leave such trials out, give noise= for a perfect fit, or give minus a log likelihood, its "
+        'sign changed, to fit(surrogate="log_likelihood")'
+    )
+    require(least > 0.0 or (least == 0.0 and noise is not None), "loss", due, float(least), cure)
     if noise is not None:
         sd = checked_number("noise", noise, lambda sd: 0.0 < sd < np.inf, "positive and finite")
         values = -0.5 * losses / sd**2
@@ -302,7 +291,7 @@ def _in_rounds(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterat
         # whole rounds are asked even if the budget ends before, so that a larger one goes on
         # from the same points
         asked = jobs(engine.ask(batch), [simulation_seed(engine.seed, i) for i in indices])
-        yield from _tell(engine, asked, runner.run(asked, engine.expected_shape))
+        yield from _tell(engine, asked, runner.run(asked))
 
 
 def _in_flight(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterator[Simulation]:
@@ -317,7 +306,7 @@ def _in_flight(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterat
         if len(flying) == batch:
             yield from land()
         (job,) = jobs(engine.ask(1), [simulation_seed(engine.seed, index)])
-        (outcome,) = runner.start([job], engine.expected_shape)
+        (outcome,) = runner.start([job])
         flying.append((job, outcome))
     while flying:
         yield from land()
@@ -335,7 +324,7 @@ def _confirmation(engine: Bolfi, made: Fit, runner: Runner, n: int) -> list[Simu
     first = max(engine.asked, engine.told)  # earlier runs may be of the same seed
     seeds = [simulation_seed(engine.seed, first + i) for i in range(n)]
     asked = jobs(engine.confirm(made, n), seeds)
-    return _tell(engine, asked, runner.run(asked, engine.expected_shape))
+    return _tell(engine, asked, runner.run(asked))
 
 
 def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Simulation]:
@@ -345,8 +334,6 @@ def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Si
         RuntimeError: the start design is over, and nothing succeeded.
     """
     theta, seeds = columns(asked)
-    if engine.expected_shape is not None:
-        results = of_one_shape(results, asked, engine.expected_shape)
     errors = [result.error for result in results]
     failed = np.full(engine.history.signal_shape, np.nan)
     signals = [failed if result.signal is None else result.signal for result in results]
@@ -358,16 +345,14 @@ def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Si
     return results
 
 
-def _length(earlier: Any) -> int:
+def _length(prior: Prior, earlier: Any) -> int:
     """Simulations in `fit`'s argument `earlier`."""
     if earlier is None:
         return 0
     told = isinstance(earlier, tuple | list) and len(earlier) in (2, 3, 4)
-    if not (told and is_table(earlier[0])):
-        raise ValueError(
-            "earlier must be (theta, signals), (theta, signals, seeds) or (theta, signals, seeds, "
-            f"errors), theta a mapping of names to values, or None, got {earlier!r:.100}"
-        )
-    if isinstance(earlier[1], list | tuple):
-        return len(earlier[1])  # `tell` looks at each of them
-    return len(np.atleast_1d(checked_array("earlier's signals", earlier[1])))
+    due = (
+        "be (theta, signals), (theta, signals, seeds) or (theta, signals, seeds, errors), theta a "
+        "mapping of names to values, or None"
+    )
+    require(told and is_table(earlier[0]), "earlier", due, earlier)
+    return len(np.atleast_2d(prior.to_array(earlier[0])))

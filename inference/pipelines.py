@@ -26,8 +26,7 @@ from .loop import fit
 from .prior import Prior, checked_prior
 from .progress import progress_bar
 from .simulations.bank import SimulationBank
-from .simulations.compute import open_compute
-from .simulations.executors import Workers
+from .simulations.compute import Workers, open_compute
 from .simulations.job import BATCH, for_engine, jobs, simulation_seed, stacked
 from .simulations.runner import run_missing
 from .sobol import sobol

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
 from ._float64 import in_float64
-from .arguments import checked_array, checked_integer, is_table
+from .arguments import checked_array, checked_integer, checked_mapping, is_table, require
 from .distributions import Univariate, describe
 from .types import Theta
 
@@ -42,20 +42,15 @@ class Prior:
         distributions: Mapping[str, dist.Distribution],
         units: Mapping[str, str] | None = None,
     ):
-        if not (isinstance(distributions, Mapping) and distributions):
-            raise ValueError(
-                "distributions must map at least one parameter to its prior, such as "
-                f"{{'a': dist.Uniform(0, 1)}}, got {distributions!r}"
-            )
+        some = isinstance(distributions, Mapping) and distributions
+        due = "map at least one parameter to its prior, such as {'a': dist.Uniform(0, 1)}"
+        require(some, "distributions", due, distributions)
         self._univariate = {name: _checked(name, d) for name, d in distributions.items()}
         self.distributions = dict(distributions)
-        named = isinstance(units, Mapping) and set(units) <= set(distributions)
-        if units is not None and not (named and all(isinstance(u, str) for u in units.values())):
-            raise ValueError(
-                f"units must map some of the parameters {tuple(distributions)} to strings, "
-                f"got {units!r}"
-            )
-        self.units = dict(units or {})
+        self.units = checked_mapping("units", units, "texts")
+        texts = all(isinstance(unit, str) for unit in self.units.values())
+        due = f"map some of the parameters {tuple(distributions)} to texts"
+        require(texts and set(self.units) <= set(distributions), "units", due, units)
         self._bounds = {name: u.bounds for name, u in self._univariate.items()}
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -100,9 +95,9 @@ class Prior:
             got = tuple(theta.keys()) if is_table(theta) else repr(theta)[:100]
             raise ValueError(f"theta must map the parameters {self.names} to values, got {got}")
         columns = [checked_array(f"theta[{name!r}]", theta[name]) for name in self.names]
-        if len({c.shape for c in columns}) > 1 or columns[0].ndim > 1:
-            shapes = {name: c.shape for name, c in zip(self.names, columns, strict=True)}
-            raise ValueError(f"theta must hold scalars or [n] arrays of one length, got {shapes}")
+        shapes = [column.shape for column in columns]
+        alike = len(set(shapes)) == 1 and columns[0].ndim <= 1
+        require(alike, "theta", "hold scalars or [n] arrays of one length", shapes)
         stacked = np.stack(columns, -1)
         if not np.isfinite(stacked).all():
             found = _first_of(~np.isfinite(stacked).all(-1), stacked, self.names)
@@ -115,12 +110,12 @@ class Prior:
         Raises:
             ValueError: of another shape.
         """
-        if np.shape(array)[-1:] != (len(self),):
-            raise ValueError(
-                f"array must have shape [..., {len(self)}], one column for each of the parameters "
-                f"{self.names}, got {array!r:.100}"
-            )
+        self._check_columns("array", array)
         return {name: array[..., j] for j, name in enumerate(self.names)}
+
+    def _check_columns(self, name: str, array: np.ndarray) -> None:
+        due = f"have shape [..., {len(self)}], one column for each of the parameters {self.names}"
+        require(np.shape(array)[-1:] == (len(self),), name, due, array)
 
     @in_float64
     def to_unit(self, theta: Theta) -> np.ndarray:
@@ -144,11 +139,7 @@ class Prior:
             ValueError: u is of another shape.
         """
         u = checked_array("u", u)
-        if u.shape[-1:] != (len(self),):
-            raise ValueError(
-                f"u must have shape [..., {len(self)}], one quantile for each of the parameters "
-                f"{self.names}, got {u.shape}"
-            )
+        self._check_columns("u", u)
         return {
             name: _quantile(self._univariate[name], u[..., j]) for j, name in enumerate(self.names)
         }
@@ -251,56 +242,52 @@ def check_key(key: object) -> None:
     """Raise ValueError unless `key` is one key of JAX, new or old."""
     new = isinstance(key, jax.Array) and jax.numpy.issubdtype(key.dtype, jax.dtypes.prng_key)
     old = getattr(key, "dtype", None) == np.uint32 and np.shape(key) == (2,)  # pyright: ignore
-    if not (old or (new and key.shape == ())):  # pyright: ignore
-        raise ValueError(f"key must be one key of JAX, such as jax.random.key(0), got {key!r:.100}")
+    one = old or (new and key.shape == ())  # pyright: ignore
+    require(one, "key", "be one key of JAX, such as jax.random.key(0)", key)
 
 
 @in_float64
 def _checked(name: str, distribution: object) -> Univariate:
-    if not isinstance(name, str) or not name or "/" in name:
-        raise ValueError(f"a parameter's name must be text without '/', got {name!r}")
-    if name in RESERVED:
-        raise ValueError(f"parameter name {name!r} is reserved for results; choose another")
+    named = isinstance(name, str) and name and "/" not in name
+    require(named, "a parameter's name", "be text without '/'", name)
+    require(
+        name not in RESERVED, "a parameter's name", "be none that is reserved for results", name
+    )
+    its = f"prior of {name!r}"
     if not isinstance(distribution, dist.Distribution):
         raise ValueError(
-            f"prior of {name!r} must be a numpyro distribution, "
-            f"got {type(distribution).__name__}; for a fixed value leave the parameter out"
+            f"{its} must be a numpyro distribution, got {type(distribution).__name__}; for a fixed "
+            "value leave the parameter out"
         )
     shape = distribution.batch_shape + distribution.event_shape
-    if shape:
-        raise ValueError(
-            f"prior of {name!r} must be univariate with shape (), got {shape}; "
-            "give one distribution per parameter"
-        )
-    if distribution.is_discrete:
-        raise ValueError(
-            f"prior of {name!r} must be continuous, got {describe(distribution)}; give a Uniform "
-            "from half below the least number to half above the largest, and round in the simulator"
-        )
+    cure = "give one distribution per parameter"
+    require(not shape, its, "be univariate with shape ()", shape, cure)
+    shown = describe(distribution)
+    cure = (
+        "give a Uniform from half below the least number to half above the largest, and round in "
+        "the simulator"
+    )
+    require(not distribution.is_discrete, its, "be continuous", shown, cure)
     try:
         with np.errstate(invalid="ignore", divide="ignore"):
             univariate = Univariate(distribution)
             returned = univariate.cdf(univariate.icdf(QUANTILES))
     except (NotImplementedError, ImportError) as error:  # numpyro asks for TFP in some icdf
         raise ValueError(
-            f"prior of {name!r} needs cdf and icdf, which {type(distribution).__name__} lacks; "
+            f"{its} needs cdf and icdf, which {type(distribution).__name__} lacks; "
             "use for example Uniform, LogUniform, Normal, LogNormal, TruncatedNormal, Gamma or Beta"
         ) from error
     except (TypeError, ValueError) as error:
         raise ValueError(
-            f"prior of {name!r} must have real numbers as arguments, got a "
+            f"{its} must have real numbers as arguments, got a "
             f"{type(distribution).__name__} of which {error}"
         ) from error
     low, high = univariate.bounds
-    if low >= high:
-        raise ValueError(
-            f"prior of {name!r} must begin below its end, got {describe(distribution)}; "
-            "exchange its bounds, or leave a fixed parameter out"
-        )
-    if not np.allclose(returned, QUANTILES):
-        raise ValueError(
-            f"prior of {name!r} must be continuous, with finite arguments, got "
-            f"{describe(distribution)}, whose cdf(icdf(q)) is {returned} at q = {QUANTILES}: a "
-            "bound may lie too far out in a tail"
-        )
+    cure = "exchange its bounds, or leave a fixed parameter out"
+    require(not low >= high, its, "begin below its end", shown, cure)
+    cure = (
+        f"its cdf(icdf(q)) is {returned} at q = {QUANTILES}: a bound may lie too far out in a tail"
+    )
+    due = "be continuous, with finite arguments"
+    require(np.allclose(returned, QUANTILES), its, due, shown, cure)
     return univariate

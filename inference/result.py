@@ -1,23 +1,44 @@
-"""The result of a run: posterior, best hypothesis, surrogate, simulations."""
+"""The result of a run: posterior, best hypothesis, surrogate, simulations.
+
+`Fit.sample` returns a tree in ArviZ's schema, with these groups.
+
+posterior: draws [chain, draw] in the parameters' own units. Attributes of each: `prior`, `units`
+(where the prior has them), `rhat`, `ess_bulk`, `ess_tail`, and Monte Carlo standard errors of mean
+and 5 and 95 % quantiles, `mcse_mean`, `mcse_q05`, `mcse_q95`. Of the group: `status` ("converged",
+or what is wrong), `rhat_max`, `ess_bulk_min`, `ess_tail_min`, `divergences`, `draws_made` (per
+chain, before thinning); for one or two parameters `quadrature_total_variation` (of 16 equally
+probable bins; independent draws as many as the effective ones stay below
+`quadrature_total_variation_limit`) and `log_evidence` of the surrogate's likelihood.
+
+sample_stats: `lp`, log density over Phi^-1(u) of the prior quantiles u, and what the sampler
+records. prior: as many draws. observed_data: `signal`. posterior_predictive: what the surrogate
+predicts at some draws, whose indices are its coordinate `draw`. constant_data: the surrogate's
+constants. emulator_checks: the surrogate's own checks for each simulation, NaN where it learned
+nothing from one, and the fit's complaints in the attribute `warnings`. simulations: as
+`Fit.simulations`. The root's attributes hold how the run was made, the seconds it took, and
+`fit_status`.
+"""
 
 import time
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from importlib.metadata import version
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import ndtr
 
 from ._float64 import in_float64
-from .arguments import check_flag, checked_integer
+from ._lazy import xr
+from .arguments import check_flag, checked_integer, require
 from .history import History
 from .notebook_display import Displayed
 from .prior import Prior
 from .sampling.confirmation import Before
-from .sampling.convergence import SamplingWarning
-from .sampling.draw import SAMPLERS, draw_posterior
+from .sampling.convergence import SamplingWarning, diagnose
+from .sampling.draw import SAMPLERS, Sampled, draw_posterior
 from .sampling.importance import LEAST, Population, explore, weighted_quantiles
 from .sampling.target import Length, Target, log_likelihood
 from .surrogates.base import Surrogate, SurrogateView
@@ -30,13 +51,10 @@ from .surrogates.warnings import (
 )
 from .types import Simulator, Theta
 
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-
-
 LEAST_EFFECTIVE = 32.0  # points of a population that stand for a posterior
 MUCH_DOUBT = 1.5  # see `Fit.doubt`: beyond it more is simulated, and a fit warns
+PREDICTED_DRAWS = 50  # draws of each chain for which the surrogate predicts
+SAMPLE_DIMS = ("chain", "draw")
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
 
 
@@ -251,9 +269,21 @@ class Fit(Displayed):
         """Every simulation in the order told: theta, seed, round, discrepancy, failed, error,
         signal. Where a discrepancy compares unlike shapes, `signal` holds those of the commonest
         and NaN elsewhere; `history.signal(row)` is any of them."""
-        from .arviz_tree import simulations_dataset
-
-        return simulations_dataset(self.prior, self.history)
+        history = self.history
+        signals = history.signals
+        axes = [f"signal_dim_{i}" for i in range(signals.ndim - 1)]
+        columns = {
+            **self.prior.to_dict(history.theta),
+            "seed": history.seeds,
+            "round": history.rounds,
+            "discrepancy": history.discrepancy,
+            "failed": ~history.succeeded,
+            "error": history.errors,
+        }
+        return xr.Dataset(
+            {name: ("simulation", values) for name, values in columns.items()}
+            | {"signal": (["simulation", *axes], signals)}
+        )
 
     @property
     def failures(self) -> dict[str, int]:
@@ -318,7 +348,7 @@ class Fit(Displayed):
 
         Returns:
             DataTree in ArviZ's schema, draws in the parameters' own units, with R-hat, effective
-            sample sizes and Monte Carlo errors; `inference.arviz_tree` describes its groups and
+            sample sizes and Monte Carlo errors; `inference.result` describes its groups and
             attributes. Opens in ArviZ 0.23 and 1.x, also from `to_netcdf`.
 
         Raises:
@@ -328,16 +358,14 @@ class Fit(Displayed):
         Warns:
             SamplingWarning: the draws are not to be trusted; see `status`.
         """
-        if sampler not in tuple(SAMPLERS):
-            raise ValueError(f"sampler must be one of {tuple(SAMPLERS)}, got {sampler!r:.100}")
+        known = tuple(SAMPLERS)
+        require(sampler in known, "sampler", f"be one of {known}", sampler)
         chains = checked_integer("chains", chains, 2, MOST_CHAINS)
         draws = checked_integer("draws", draws, 4, MOST_DRAWS)
         warmup = checked_integer("warmup", warmup, 1, MOST_DRAWS)
         extend = checked_integer("extend", extend)
         seed = checked_integer("seed", seed, 0)
         check_flag("warn", warn)
-        from .arviz_tree import results_tree
-
         started = time.perf_counter()
         length = Length(chains, warmup, draws)
         made = draw_posterior(sampler, self._target, self.prior.names, length, seed, extend)
@@ -350,7 +378,7 @@ class Fit(Displayed):
             "fit_status": self.status,
             **{f"seconds_{part}": spent for part, spent in seconds.items()},
         }
-        return results_tree(self, self.warnings, made, seed, attributes)
+        return _tree(self, made, seed, attributes)
 
     def check(self, n: int = 200, **how: Any) -> Any:
         """Ranks and coverage of the pipeline that made this fit, on n data sets of known truth.
@@ -387,36 +415,73 @@ class Fit(Displayed):
         """
         return self.recipe.criticise(self, extensions, **how)
 
-    def plot_search(self, ax: "Axes | None" = None) -> "Axes":
-        """Discrepancy of every simulation by the round in which it was asked.
 
-        Args:
-            ax: To draw on; None makes a figure.
+def _tree(fit: Fit, made: Sampled, seed: int, attributes: Mapping[str, object]) -> "xr.DataTree":
+    """The tree that `Fit.sample` returns.
 
-        Raises:
-            ValueError: `ax` is no axes of Matplotlib.
-        """
-        from .figures import plot_search
+    Args:
+        seed: Of the prior's draws, as many as each chain's, and of the predictions.
+        attributes: Of the root.
+    """
+    import arviz_base
 
-        return plot_search(self.history, ax)
+    prior, chains, length = fit.prior, made.chains, made.chains.u.shape[1]
+    posterior = prior.from_unit(chains.u)
+    rng = np.random.default_rng([seed, *b"prior"])
+    before = prior.from_unit(rng.random((length, len(prior))))
+    tree = arviz_base.from_dict(
+        {
+            "posterior": posterior,
+            "sample_stats": dict(chains.stats),
+            "prior": {name: values[None] for name, values in before.items()},
+            "observed_data": {"signal": fit.observed},
+        }
+    )
+    tree["simulations"] = xr.DataTree(fit.simulations)
+    for group in ("posterior", "prior", "simulations"):
+        for name, described in prior.describe().items():
+            tree[group][name].attrs.update(described)
+    diagnosed = {name: diagnose(draws) for name, draws in posterior.items()}
+    for name, measures in diagnosed.items():
+        tree["posterior"][name].attrs.update(measures)
+    tree["posterior"].attrs.update(
+        rhat_max=max(measures["rhat"] for measures in diagnosed.values()),
+        ess_bulk_min=min(measures["ess_bulk"] for measures in diagnosed.values()),
+        ess_tail_min=min(measures["ess_tail"] for measures in diagnosed.values()),
+        divergences=int(np.sum(chains.stats.get("diverging", 0))),
+        status=made.status,
+        draws_made=made.steps,
+        **made.checks,
+    )
+    constants = {name: np.asarray(value) for name, value in fit.learned.constants().items()}
+    if constants:
+        tree["constant_data"] = arviz_base.from_dict({"constant_data": constants})["constant_data"]
+    rows = np.linspace(0, length - 1, min(length, PREDICTED_DRAWS)).round().astype(int)
+    generator = np.random.default_rng([seed, *b"predictive"])
+    predicted = fit.learned.predictive(generator, chains.u[:, rows].reshape(-1, len(prior)))
+    if predicted:
+        groups = {
+            name: np.asarray(values).reshape(-1, len(rows), *np.shape(values)[1:])
+            for name, values in predicted.items()
+        }
+        drawn = arviz_base.from_dict({"posterior_predictive": groups}, coords={"draw": rows})
+        tree["posterior_predictive"] = drawn["posterior_predictive"]
+    tree["emulator_checks"] = xr.DataTree(_emulator_checks(fit))
+    for group in tree.children.values():
+        sampled = [name for name in SAMPLE_DIMS if name in group.dims]
+        group.attrs.pop("sample_dims", None)
+        if sampled:
+            group.attrs["sample_dims"] = sampled
+    tree.attrs.update(attributes, version=version("bolfi-liquids"))
+    return tree
 
-    def plot_predictive(
-        self, sampled: "xr.DataTree | None" = None, axes: Any = None
-    ) -> "list[Axes]":
-        """The observed output, the closest simulation and the posterior predictive distribution.
 
-        The predictive distribution needs the signal family without a summary: the paper's
-        surrogate predicts discrepancies alone, and is drawn without it.
-
-        Args:
-            sampled: What `sample` returned; None samples here.
-            axes: One for each of the output's channels; None makes a figure.
-
-        Raises:
-            ValueError: `sampled` is no tree, or `axes` are no axes of Matplotlib, or too few.
-        """
-        from .figures import check_axes, plot_predictive
-
-        check_axes(axes)
-        tree = self.sample(draws=250, warmup=250, warn=False) if sampled is None else sampled
-        return plot_predictive(self.observed, self.closest.signal, tree, axes)
+def _emulator_checks(fit: Fit) -> "xr.Dataset":
+    """The surrogate's checks with a row for each simulation."""
+    columns = {}
+    for name, values in fit.learned.checks().items():
+        of_all = np.full((len(fit.training_mask), *values.shape[1:]), np.nan)
+        of_all[fit.training_mask] = values
+        axes = (f"{name}_dim_{i}" for i in range(values.ndim - 1))
+        columns[name] = (["simulation", *axes], of_all)
+    return xr.Dataset(columns, attrs={"warnings": "\n".join(fit.warnings)})

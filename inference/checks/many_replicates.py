@@ -22,8 +22,8 @@ from ..arguments import (
 from ..describe import describe
 from ..prior import Prior, checked_prior
 from ..progress import progress_bar
+from ..simulations.compute import Workers, open_executor
 from ..simulations.database import disk_errors, opened_database
-from ..simulations.executors import Workers, open_executor
 from ..simulations.failures import failure_columns, failure_of, is_unusable
 from ..simulations.job import BATCH
 from ..types import Simulator

@@ -12,8 +12,7 @@ from ..arguments import check_function, check_kind, checked_integer, checked_num
 from ..notebook_display import Displayed
 from ..prior import Prior, checked_prior
 from ..simulations.bank import SimulationBank
-from ..simulations.compute import open_compute
-from ..simulations.executors import Workers
+from ..simulations.compute import Workers, open_compute
 from ..simulations.job import BATCH
 from .experiment import Experiment, Extensions, Proposal, check_extensions
 from .held_out import Gap, Suggestion, gap, holds, suggest

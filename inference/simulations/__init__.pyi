@@ -2,9 +2,9 @@ from .bank import Simulation as Simulation
 from .bank import SimulationBank as SimulationBank
 from .bank import Simulations as Simulations
 from .compute import Compute as Compute
+from .compute import Workers as Workers
 from .compute import open_compute as open_compute
-from .executors import Workers as Workers
-from .executors import open_executor as open_executor
+from .compute import open_executor as open_executor
 from .job import BatchSimulator as BatchSimulator
 from .job import Job as Job
 from .job import OneByOne as OneByOne

@@ -5,15 +5,15 @@ import logging
 import sqlite3
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from hashlib import sha256
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import check_text, checked_integer
+from ..arguments import LARGEST_INT64, check_kind, check_text, checked_integer, require
 from ..notebook_display import Displayed
 from .database import disk_errors, opened_database
 from .failures import Failure, failure_columns, failure_of
@@ -21,7 +21,6 @@ from .simulation_locks import Claims
 
 logger = logging.getLogger(__name__)
 
-LARGEST_SEED = 2**63 - 1  # that SQLite can hold
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS simulation (
     identity TEXT NOT NULL,
@@ -95,11 +94,9 @@ class SimulationBank(Displayed):
         return f"Finished simulations are kept in {self.path}"
 
     def _shown(self) -> list[tuple[str, str]]:
+        count = "SELECT identity, count(*), count(signal) FROM simulation GROUP BY identity"
         try:
-            with self._lock:
-                found = self._connection.execute(
-                    "SELECT identity, count(*), count(signal) FROM simulation GROUP BY identity"
-                ).fetchall()
+            found = self._execute(count)
         except sqlite3.ProgrammingError:
             return [("file", self.path), ("state", "closed")]
         of_each = [
@@ -108,32 +105,37 @@ class SimulationBank(Displayed):
         ]
         return [("file", self.path), *(of_each or [("simulations", "none")])]
 
+    def _execute(self, statement: str, *values: object) -> list[tuple[Any, ...]]:
+        with self._lock:
+            return self._connection.execute(statement, values).fetchall()
+
+    def _rows(self, where: str, *values: object) -> list[tuple[Any, ...]]:
+        """Rows as `_digest` takes them, by theta and seed; damaged ones are logged and removed, for
+        else they could not be put again."""
+        found = self._execute(
+            "SELECT identity, theta, seed, signal, dtype, shape, failure, error, seconds, digest "
+            f"FROM simulation WHERE {where} ORDER BY theta, seed",
+            *values,
+        )
+        whole = []
+        for *row, digest in found:
+            if _digest(row) == digest:
+                whole.append(tuple(row))
+                continue
+            damaged = "%s: a damaged row counts as not simulated: %s"
+            logger.warning(damaged, self.path, row[1:3])
+            self._execute("DELETE FROM simulation WHERE digest = ?", digest)
+        return whole
+
     def get(self, identity: str, theta: Mapping[str, float], seed: int) -> Simulation | None:
         """The run of exactly this simulator, theta and seed, or None."""
         key = _key(identity, theta, seed)
-        with self._lock:
-            row = self._connection.execute(
-                "SELECT signal, dtype, shape, failure, error, seconds, digest FROM simulation "
-                "WHERE identity = ? AND theta = ? AND seed = ?",
-                key,
-            ).fetchone()
-        if row is None:
+        rows = self._rows("identity = ? AND theta = ? AND seed = ?", *key)
+        if not rows:
             return None
-        *kept, digest = row
-        if not self._is_whole((*key, *kept), digest):
-            with self._lock:  # else it could not be put again
-                self._connection.execute("DELETE FROM simulation WHERE digest = ?", (digest,))
-            return None
-        blob, dtype, shape, kind, text, seconds = kept
+        _, _, _, blob, dtype, shape, kind, text, seconds = rows[0]
         signal = None if blob is None else _signal(blob, dtype, shape)
         return Simulation(signal, failure_of(kind, text), seconds)
-
-    def _is_whole(self, row: tuple, digest: bytes) -> bool:
-        """Whether a row, see `_digest`, is as it was stored."""
-        if _digest(row) == digest:
-            return True
-        logger.warning("%s: a damaged row counts as not simulated: %s", self.path, row[1:3])
-        return False
 
     def put(
         self, identity: str, theta: Mapping[str, float], seed: int, simulation: Simulation
@@ -146,33 +148,30 @@ class SimulationBank(Displayed):
         Raises:
             OSError: the disk is full or fails; what is in the bank is kept.
         """
-        if not isinstance(simulation, Simulation):
-            raise ValueError(f"simulation must be a Simulation, got {simulation!r:.100}")
+        check_kind("simulation", simulation, Simulation)
         blob, dtype, shape = None, None, None
         if simulation.signal is not None:
             signal = np.ascontiguousarray(simulation.signal)
             blob, dtype, shape = signal.tobytes(), signal.dtype.str, json.dumps(signal.shape)
         why, seconds = failure_columns(simulation.error), float(simulation.seconds)
         row = (*_key(identity, theta, seed), blob, dtype, shape, *why, seconds)
-        with self._lock, disk_errors(self.path):
-            self._connection.execute(
+        with disk_errors(self.path):
+            self._execute(
                 "INSERT INTO simulation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) "
                 "ON CONFLICT DO UPDATE SET signal = excluded.signal, dtype = excluded.dtype, "
                 "shape = excluded.shape, failure = excluded.failure, error = excluded.error, "
                 "seconds = excluded.seconds, created = excluded.created, digest = excluded.digest "
                 "WHERE simulation.signal IS NULL",
-                (*row, time.time(), _digest(row)),
+                *row,
+                time.time(),
+                _digest(row),
             )
 
     def holds(self, identity: str) -> bool:
         """Whether there is a signal of this simulator."""
         check_text("identity", identity)
-        with self._lock:
-            found = self._connection.execute(
-                "SELECT 1 FROM simulation WHERE identity = ? AND signal IS NOT NULL LIMIT 1",
-                (identity,),
-            ).fetchone()
-        return found is not None
+        known = "SELECT 1 FROM simulation WHERE identity = ? AND signal IS NOT NULL LIMIT 1"
+        return bool(self._execute(known, identity))
 
     def simulations(self, identity: str) -> Simulations:
         """All signals of one simulator, those of NaN included, those that raised left out.
@@ -184,25 +183,16 @@ class SimulationBank(Displayed):
             ValueError: there are none, or their signals or parameters are not alike.
         """
         check_text("identity", identity)
-        with self._lock:
-            rows = self._connection.execute(
-                "SELECT theta, seed, signal, dtype, shape, failure, error, seconds, digest "
-                "FROM simulation WHERE identity = ? AND signal IS NOT NULL ORDER BY theta, seed",
-                (identity,),
-            ).fetchall()
-        rows = [row for row in rows if self._is_whole((identity, *row[:-1]), row[-1])]
-        theta = [json.loads(row[0]) for row in rows]
-        kinds = {(tuple(names), row[4]) for names, row in zip(theta, rows, strict=True)}
-        if len(kinds) != 1:
-            found = "; ".join(f"{', '.join(n)} -> {shape}" for n, shape in sorted(kinds))
-            raise ValueError(
-                f"{self.path} must hold simulations of one kind for identity={identity!r}, "
-                f"got {found or 'none'}"
-            )
+        rows = self._rows("identity = ? AND signal IS NOT NULL", identity)
+        theta = [json.loads(row[1]) for row in rows]
+        kinds = {(tuple(names), row[5]) for names, row in zip(theta, rows, strict=True)}
+        found = [f"{', '.join(names)} -> {shape}" for names, shape in sorted(kinds)]
+        due = f"hold simulations of one kind for identity={identity!r}"
+        require(len(kinds) == 1, self.path, due, found or None)
         return Simulations(
             {name: np.array([row[name] for row in theta]) for name in theta[0]},
-            np.stack([_signal(*row[2:5]) for row in rows]),
-            np.array([row[1] for row in rows], np.int64),
+            np.stack([_signal(*row[3:6]) for row in rows]),
+            np.array([row[2] for row in rows], np.int64),
         )
 
     def claim(self, identity: str, theta: Mapping[str, float], seed: int) -> bool:
@@ -218,8 +208,7 @@ class SimulationBank(Displayed):
         self._claims.give_back(json.dumps(_key(identity, theta, seed)))
 
     def __len__(self) -> int:
-        with self._lock:
-            return self._connection.execute("SELECT count(*) FROM simulation").fetchone()[0]
+        return self._execute("SELECT count(*) FROM simulation")[0][0]
 
     def close(self) -> None:
         """Close the file and end this bank's claims; closing twice does no harm."""
@@ -240,14 +229,14 @@ def _key(identity: str, theta: Mapping[str, float], seed: int) -> tuple[str, str
         ValueError: no text, no names and numbers, or no integer.
     """
     check_text("identity", identity)
-    whole = checked_integer("seed", seed, -LARGEST_SEED - 1, LARGEST_SEED)
+    whole = checked_integer("seed", seed, -LARGEST_INT64 - 1, LARGEST_INT64)
     try:
         return identity, json.dumps({name: float(theta[name]) for name in sorted(theta)}), whole
     except (TypeError, ValueError, KeyError) as error:
         raise ValueError(f"theta must map names to numbers, got {theta!r:.100}") from error
 
 
-def _digest(row: tuple) -> bytes:
+def _digest(row: Sequence[Any]) -> bytes:
     """Of identity, theta, seed, signal, dtype, shape, kind of failure, error and seconds."""
     signal = row[3] or b""
     return sha256(repr((*row[:3], *row[4:])).encode() + signal).digest()

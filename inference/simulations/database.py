@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from zlib import crc32
 
+from ..arguments import require
+
 BUSY_MS = 60_000  # wait this long for another process's write
 
 
@@ -48,8 +50,8 @@ def opened_database(path: object, schema: str, what: str) -> sqlite3.Connection:
         ValueError: `path` is no path, another file, or cannot be read and written.
         OSError: the disk is full or fails.
     """
-    if not isinstance(path, str | os.PathLike) or not str(path):
-        raise ValueError(f"a {what} needs the path of a file, got {path!r}")
+    named = isinstance(path, str | os.PathLike) and str(path)
+    require(named, what, "have the path of a file", path)
     # threads may share it, if they take turns
     options = {"timeout": BUSY_MS / 1000, "isolation_level": None, "check_same_thread": False}
     try:

@@ -2,8 +2,6 @@
 
 import os
 import traceback
-from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -98,8 +96,3 @@ def incomparable(what: str) -> Failure:
 
 def impossible(what: str) -> Failure:
     return Failure(FailureKind.IMPOSSIBLE, what)
-
-
-def count(failures: Iterable[Failure | None]) -> dict[str, int]:
-    """Failures by kind; kinds that did not occur, and None for success, are left out."""
-    return dict(Counter(one.kind.value for one in failures if one is not None))

@@ -6,7 +6,9 @@ library (tested), so that they start quickly and stay small.
 
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -14,11 +16,17 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from ..arguments import Unusable, check_callable, checked_integer, checked_mapping, float64
+from ..arguments import (
+    Unusable,
+    check_callable,
+    checked_integer,
+    checked_mapping,
+    float64,
+    require,
+)
 from ..types import Simulator, SingleSimulator
 from .bank import Simulation
 from .failures import Failure, is_unusable, raised, timed_out, unusable
-from .returned import commonest, signals_of
 
 BATCH = 4  # runs in one call, or in flight, where nobody says how many
 
@@ -139,42 +147,32 @@ def for_engine(
         ValueError: bad argument, or one that contradicts the simulator.
     """
     if isinstance(simulate, BatchSimulator | OneByOne):
-        if not vectorised or together != 1 or time_limit is not None:
-            raise ValueError(
-                f"a {type(simulate).__name__} holds itself how it is called: leave vectorised, "
-                "together and time_limit out"
-            )
+        silent = vectorised and together == 1 and time_limit is None
+        due = "come without vectorised, together and time_limit, which it holds itself"
+        require(silent, f"a {type(simulate).__name__}", due, (vectorised, together, time_limit))
         return simulate
     if vectorised:
         return BatchSimulator(cast(Simulator, simulate), together, time_limit)
-    if together != 1:
-        raise ValueError(
-            f"vectorised=False makes one run in each call: leave out together={together!r:.100}"
-        )
+    require(together == 1, "together", "be left out with vectorised=False", together)
     return OneByOne(cast(SingleSimulator, simulate), time_limit)
 
 
-def of_one_shape(
-    results: Sequence[Simulation], batch: Sequence[Job], shape: tuple[int, ...] | None
-) -> list[Simulation]:
-    """The results of jobs; a signal of another shape than the others is a failed run.
+def of_one_shape(results: Sequence[Simulation], batch: Sequence[Job]) -> list[Simulation]:
+    """The results of jobs; a signal of another shape than the commonest is a failed run."""
+    due = commonest([result.signal.shape for result in results if result.signal is not None])
 
-    Args:
-        shape: Of one signal; None takes the commonest.
-    """
-    shapes = [result.signal.shape for result in results if result.signal is not None]
-    due = commonest(shapes) if shape is None else shape
-    return [
-        result
-        if result.signal is None or result.signal.shape == due
-        else result._replace(
-            signal=None,
-            error=unusable(
-                f"a signal of shape {due} is expected, got {result.signal.shape} of {job}"
-            ),
-        )
-        for result, job in zip(results, batch, strict=True)
-    ]
+    def judged(result: Simulation, job: Job) -> Simulation:
+        if result.signal is None or result.signal.shape == due:
+            return result
+        told = f"a signal of shape {due} is expected, got {result.signal.shape} of {job}"
+        return result._replace(signal=None, error=unusable(told))
+
+    return list(map(judged, results, batch))
+
+
+def commonest(shapes: Sequence[tuple[int, ...]]) -> tuple[int, ...] | None:
+    """The shape that occurs most often, the first of them at a tie; None of none."""
+    return next((shape for shape, _ in Counter(shapes).most_common(1)), None)
 
 
 def stacked(results: Sequence[Simulation], shape: tuple[int, ...] | None = None) -> np.ndarray:
@@ -187,8 +185,7 @@ def stacked(results: Sequence[Simulation], shape: tuple[int, ...] | None = None)
         ValueError: signals of several shapes, or none and no `shape`.
     """
     found = {result.signal.shape for result in results if result.signal is not None}
-    if len(found) > 1:
-        raise ValueError(f"simulate must return signals of one shape, got {sorted(found)}")
+    require(len(found) <= 1, "simulate", "return signals of one shape", sorted(found))
     known = next(iter(found), shape)
     if known is None:
         raise ValueError(f"all {len(results)} simulations failed, so their shape is not known")
@@ -222,38 +219,63 @@ def run_batch(
         timeout: Seconds per job that the call may take, see `within`.
     """
     neutral = simulate.neutral if isinstance(simulate, BatchSimulator) else {}
-    named = [frozenset(job.theta.keys() - neutral.keys()) for job in batch]
-    if len(set(named)) > 1:
-        found: dict[int, Simulation] = {}
-        for names in dict.fromkeys(named):
-            places = [place for place, own in enumerate(named) if own == names]
-            part = run_batch(simulate, [batch[place] for place in places], shape, timeout)
-            found.update(zip(places, part, strict=True))
-        return [found[place] for place in range(len(batch))]
-    theta, seeds = columns(batch, neutral)
+    alike: dict[frozenset[str], list[int]] = {}
+    for place, job in enumerate(batch):
+        alike.setdefault(frozenset(job.theta.keys() - neutral.keys()), []).append(place)
+    found: dict[int, Simulation] = {}
+    for places in alike.values():
+        part = [batch[place] for place in places]
+        made = _one_call(simulate, part, columns(part, neutral), shape, timeout)
+        found.update(zip(places, made, strict=True))
+    return [found[place] for place in range(len(batch))]
+
+
+def _one_call(
+    simulate: Simulator,
+    batch: Sequence[Job],
+    arguments: tuple[dict[str, np.ndarray], np.ndarray],
+    shape: tuple[int, ...] | None,
+    timeout: float | None,
+) -> list[Simulation]:
+    limit = simulate.time_limit if isinstance(simulate, BatchSimulator | OneByOne) else None
+    allowed = None if timeout is None else timeout * len(batch)
     started = time.perf_counter()
     try:
         signals = within(
-            None if timeout is None else timeout * len(batch),
-            lambda: signals_of(simulate(theta, seeds), len(batch), shape),
-            limit_of(simulate),
+            allowed, lambda: signals_of(simulate(*arguments), len(batch), shape), limit
         )
+    except Overdue:
+        failure, seconds = timed_out(timeout or 0.0), timeout or 0.0
     # whatever the user's code raises is a failed run, and kept; many programs end by SystemExit
     except (Exception, SystemExit) as error:
-        if len(batch) > 1:
-            made = [run_batch(simulate, [job], shape, timeout)[0] for job in batch]
-            if isinstance(error, Unusable) and all(is_unusable(one.error) for one in made):
-                # no run is right alone either: tell of the call that the user's code got
-                told = misshapen(simulate, batch, shape, error)
-                return [one._replace(error=told) for one in made]
-            return made
-        if isinstance(error, Overdue) and timeout is not None:
-            return [Simulation(None, timed_out(timeout), timeout)]
         bad = isinstance(error, Unusable)
-        told = misshapen(simulate, batch, shape, error) if bad else raised(error)
-        return [Simulation(None, told, time.perf_counter() - started)]
-    seconds = (time.perf_counter() - started) / len(batch)
-    return [Simulation(signal, None, seconds) for signal in signals]
+        failure = misshapen(simulate, batch, shape, error) if bad else raised(error)
+        seconds = time.perf_counter() - started
+    else:
+        seconds = (time.perf_counter() - started) / len(batch)
+        return [Simulation(signal, None, seconds) for signal in signals]
+    if len(batch) == 1:
+        return [Simulation(None, failure, seconds)]
+    made = [run_batch(simulate, [job], shape, timeout)[0] for job in batch]
+    if is_unusable(failure) and all(is_unusable(one.error) for one in made):
+        # no run is right alone either: tell of the call that the user's code got
+        return [one._replace(error=failure) for one in made]
+    return made
+
+
+def signals_of(returned: object, n: int, shape: tuple[int, ...] | None) -> np.ndarray:
+    """What a simulator returned for n runs: float64 [n, *shape].
+
+    Args:
+        shape: Of one signal; None accepts any.
+
+    Raises:
+        Unusable: no numbers, or of another shape.
+    """
+    signals = float64(returned)
+    if signals.shape[:1] != (n,) or shape not in (None, signals.shape[1:]):
+        raise Unusable(str(signals.shape), signals.shape)
+    return signals
 
 
 def misshapen(
@@ -262,25 +284,17 @@ def misshapen(
     """The failure of a simulator that returned something else than signals for these jobs."""
     of_which = f" for {batch[0].theta}, seed {batch[0].seed}" if len(batch) == 1 else ""
     if isinstance(simulate, OneByOne):
-        due = "" if shape is None else f", of shape {shape}"
         # `OneByOne` puts an axis for the one run before the signal's
         got = error.got if error.shape is None else error.shape[1:]
-        return unusable(
-            f"with vectorised=False simulate must return the signal of one run{due}, got "
-            f"{got}{of_which}"
-        )
+        due = "one signal" if shape is None else f"one signal of shape {shape}"
+        return unusable(f"simulate must return {due}, got {got}{of_which} by vectorised=False")
+    due = f"({len(batch)}, ...)" if shape is None else (len(batch), *shape)
     single = error.shape is not None and error.shape == shape
     cure = "; if it makes one run at a time, pass vectorised=False" if single else ""
-    due = f"({len(batch)}, ...)" if shape is None else (len(batch), *shape)
     return unusable(
         f"simulate must return signals of shape {due}, one row per theta, got {error.got}"
         f"{of_which}{cure}"
     )
-
-
-def limit_of(simulate: object) -> Limit | None:
-    """How a simulator stops itself; None if it does not."""
-    return simulate.time_limit if isinstance(simulate, BatchSimulator | OneByOne) else None
 
 
 def within[R](timeout: float | None, call: Callable[[], R], limit: Limit | None = None) -> R:
@@ -305,21 +319,18 @@ def within[R](timeout: float | None, call: Callable[[], R], limit: Limit | None 
             if time.monotonic() < ends:
                 raise
             raise Overdue from error
-    returned: list[R] = []
-    failed: list[BaseException] = []
+    outcome: Future[R] = Future()
 
     def run() -> None:
         try:
-            returned.append(call())
+            outcome.set_result(call())
         except BaseException as error:  # for the caller to judge
-            failed.append(error)
+            outcome.set_exception(error)
 
     # a daemon does not keep the process from ending
     thread = threading.Thread(target=run, name="simulate", daemon=True)
     thread.start()
     thread.join(min(timeout, threading.TIMEOUT_MAX))
-    if failed:
-        raise failed[0]
-    if returned:
-        return returned[0]
-    raise Overdue
+    if not outcome.done():
+        raise Overdue
+    return outcome.result()

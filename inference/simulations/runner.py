@@ -10,22 +10,17 @@ from typing import NamedTuple
 
 from ..types import Simulator
 from .bank import Simulation, SimulationBank
-from .compute import Compute
-from .executors import is_pool, killed_its_worker
+from .compute import Compute, is_pool, killed_its_worker
 from .failures import FailureKind, NoSignals, is_unusable, raised, unusable
 from .job import BATCH, BatchSimulator, Job, OneByOne, of_one_shape, run_batch
 
 POLL_SECONDS = 0.2  # seconds between looks at what somebody else is simulating
-
-Shape = tuple[int, ...] | None
-"""Of one signal; None accepts any."""
 
 
 class Order(NamedTuple):
     """A simulation that is wanted; `outcome` is done once the bank holds it."""
 
     job: Job
-    shape: Shape
     outcome: "Future[Simulation]"
 
 
@@ -43,11 +38,18 @@ class Runner:
     Args:
         simulate: The user's simulator.
         compute: Where simulations are made and kept; the caller decides on batches.
+        shape: Of one signal; None accepts any.
         identity: The simulator's name in the bank.
     """
 
-    def __init__(self, simulate: Simulator, compute: Compute, identity: str = ""):
-        self.simulate = simulate
+    def __init__(
+        self,
+        simulate: Simulator,
+        compute: Compute,
+        shape: tuple[int, ...] | None = None,
+        identity: str = "",
+    ):
+        self.simulate, self.shape = simulate, shape
         self._results = self._unusable = 0
         self._resources = ExitStack()
         own = SimulationBank() if compute.bank is None else nullcontext(compute.bank)
@@ -75,23 +77,23 @@ class Runner:
             self._release(outcome)
         self._resources.close()
 
-    def run(self, batch: Sequence[Job], shape: Shape) -> list[Simulation]:
+    def run(self, batch: Sequence[Job]) -> list[Simulation]:
         """Results of all jobs, in order, once all are finished.
 
         Raises:
             NoSignals: none of the first runs gave a signal of this shape.
             RuntimeError: the executor lost a simulation.
         """
-        return [self.result(outcome) for outcome in self.start(batch, shape)]
+        return [self.result(outcome) for outcome in self.start(batch)]
 
-    def start(self, batch: Sequence[Job], shape: Shape) -> "list[Future[Simulation]]":
+    def start(self, batch: Sequence[Job]) -> "list[Future[Simulation]]":
         """Begin all jobs that the bank lacks; without an executor this also ends them.
 
         Returns:
             An outcome per job, for `result`. With an executor those of a call are stored the
             moment it is finished, in whatever order.
         """
-        orders = [Order(job, shape, Future()) for job in batch]
+        orders = [Order(job, Future()) for job in batch]
         self._elsewhere += orders
         self._begin()
         return [order.outcome for order in orders]
@@ -131,13 +133,19 @@ class Runner:
             self._simulate(part)
 
     def _found(self, order: Order) -> bool:
+        """Whether the bank holds what need not be tried again: a signal, also one of NaN, and a
+        timeout unless more time is allowed now; not what raised."""
         found = self.bank.get(self.identity, *order.job)
-        if found is None or not is_final(found, self.timeout):
+        if found is None:
             return False
-        if found.signal is not None and order.shape not in (None, found.signal.shape):
+        if found.error is not None:
+            late = found.error.kind is FailureKind.TIMEOUT
+            if not late or self.timeout is None or self.timeout > found.seconds:
+                return False
+        if found.signal is not None and self.shape not in (None, found.signal.shape):
             told = (
                 f"the bank {self.bank.path} holds a signal of shape {found.signal.shape} under "
-                f"identity={self.identity!r}, where {order.shape} is expected; it is another "
+                f"identity={self.identity!r}, where {self.shape} is expected; it is another "
                 "simulator's: give each its own identity=, or choose another bank"
             )
             found = Simulation(None, unusable(told), found.seconds)
@@ -157,7 +165,7 @@ class Runner:
     def _simulate(self, orders: Sequence[Order]) -> None:
         """Make the runs in one call, here or on the executor."""
         batch = [order.job for order in orders]
-        work = partial(run_batch, self.simulate, batch, orders[0].shape, self.timeout)
+        work = partial(run_batch, self.simulate, batch, self.shape, self.timeout)
         if self.executor is None:
             for order, made in zip(orders, work(), strict=True):
                 self._keep(order, made)
@@ -204,18 +212,18 @@ class Runner:
 
     def _explained(self, error: BaseException, submitting: bool = False) -> BaseException:
         """What to tell the user of an executor's own error."""
-        if _is_of_pickling(error, self.simulate):
-            told = TypeError(
-                "simulate must be picklable to reach the executor's workers "
-                f"({error}); define it at the top level of a module"
-            )
-        elif isinstance(error, BrokenExecutor | CancelledError):
+        if isinstance(error, BrokenExecutor | CancelledError):
             jobs = "; ".join(f"{job.theta}, seed {job.seed}" for job in list(self._mine.values()))
             told = RuntimeError(
                 f"the executor lost its workers ({raised(error)}): one was killed, ran out of "
                 "memory, crashed in the simulator or could not import it. "
                 f"In flight: {jobs}. {self.bank.where}; "
                 "mend the cause and repeat the call with a new executor to go on from there"
+            )
+        elif _is_of_pickling(error, self.simulate):
+            told = TypeError(
+                "simulate must be picklable to reach the executor's workers "
+                f"({error}); define it at the top level of a module"
             )
         elif submitting and isinstance(error, RuntimeError):
             told = RuntimeError(
@@ -233,35 +241,18 @@ def _is_of_pickling(error: BaseException, simulate: Simulator) -> bool:
     Python raises an AttributeError for a local function and a TypeError for what holds a lock,
     and other mistakes raise these, too.
     """
-    if isinstance(error, pickle.PicklingError):
-        return True
-    if not isinstance(error, AttributeError | TypeError):
-        return False
     try:
         pickle.dumps(simulate)
     except Exception:
-        return True
-    return False
-
-
-def is_final(found: Simulation, timeout: float | None) -> bool:
-    """Whether a stored simulation need not be tried again.
-
-    A signal is final, also one of NaN, and so is a timeout unless more time is allowed now; what
-    raised is not.
-    """
-    if found.error is None:
-        return True
-    if found.error.kind is not FailureKind.TIMEOUT:
-        return False
-    return timeout is not None and timeout <= found.seconds
+        return isinstance(error, pickle.PicklingError | AttributeError | TypeError)
+    return isinstance(error, pickle.PicklingError)
 
 
 def run_missing(
     simulate: Simulator,
     jobs: Sequence[Job],
     compute: Compute,
-    shape: Shape = None,
+    shape: tuple[int, ...] | None = None,
     *,
     identity: str = "",
     advance: Callable[[int], object] = lambda count: None,
@@ -281,9 +272,9 @@ def run_missing(
     """
     at_once = None if compute.executor is not None else compute.batch
     results = []
-    with Runner(simulate, compute, identity) as runner:
+    with Runner(simulate, compute, shape, identity) as runner:
         for part in batched(jobs, at_once or max(len(jobs), 1)):
-            for outcome in runner.start(part, shape):
+            for outcome in runner.start(part):
                 results.append(runner.result(outcome))
                 advance(1)
-    return of_one_shape(results, jobs, shape)
+    return of_one_shape(results, jobs) if shape is None else results

@@ -53,23 +53,3 @@ def test_a_run_that_is_not_finite_is_left_out():
     learned = inference.emulate(PRIOR, THETA, outputs, ONE)
     assert learned.left_out.shape == (49, 30)
     np.testing.assert_allclose(learned.predict(FRESH), curve(FRESH), atol=0.02)
-
-
-@pytest.mark.parametrize(
-    ("outputs", "scale", "match"),
-    [
-        (curve(THETA)[:9], ONE, r"shape \(50, m\)"),
-        (curve(THETA)[:, 0], ONE, r"shape \(50, m\)"),
-        (curve(THETA), ONE[:3], "30 positive"),
-        (curve(THETA), 0.0 * ONE, "30 positive"),
-        (np.full((50, 30), np.nan), ONE, "finite for 3 theta, got 0"),
-    ],
-)
-def test_wrong_arguments_are_refused(outputs, scale, match):
-    with pytest.raises(ValueError, match=match):
-        inference.emulate(PRIOR, THETA, outputs, scale)
-
-
-def test_theta_outside_of_the_prior_is_refused():
-    with pytest.raises(ValueError, match="support"):
-        inference.emulate(PRIOR, {**THETA, "a": THETA["a"] + 1.0}, curve(THETA), ONE)

@@ -100,13 +100,12 @@ def test_a_table_far_from_a_narrow_posterior():
         assert (fit.closest.discrepancy > 10.0) == far == (UNCERTAIN in fit.warnings)
 
 
-@pytest.mark.parametrize("factor", [1.0, 1e4])
-def test_depths_do_not_spoil_the_top(factor):
-    """Thousands or millions of nats below the best, where the model is off, too."""
+def test_depths_do_not_spoil_the_top():
+    """Millions of nats below the best, where the model is off, too."""
 
     def steep(theta):
         far = np.maximum(np.abs(theta["a"]) - 1.5, 0.0)
-        return round_hill(theta) - factor * far**3
+        return round_hill(theta) - 1e4 * far**3
 
     fit = inference.fit(lambda t, s: steep(t), BOX, surrogate="log_likelihood", budget=30, **QUIET)
     assert_near(fit, steep, 0.2, 1.2)
@@ -121,16 +120,14 @@ def noisy(log_likelihood, sd, told=False):
     return simulate
 
 
-@pytest.mark.parametrize("sd", [0.0, 1.0])
-def test_a_banana(sd):
+def test_a_banana():
     fit = inference.fit(
-        noisy(banana, sd), BOX, surrogate="log_likelihood", budget=60, seed=1, **QUIET
+        noisy(banana, 0.0), BOX, surrogate="log_likelihood", budget=60, seed=1, **QUIET
     )
-    assert_near(fit, banana, *((0.2, 1.25) if sd == 0.0 else (1.0, 2.0)))
+    assert_near(fit, banana, 0.2, 1.25)
 
 
-@pytest.mark.parametrize("told", [False, True])
-@pytest.mark.parametrize("sd", [1.0, 3.0])
+@pytest.mark.parametrize(("sd", "told"), [(3.0, False), (1.0, True)])
 def test_noisy_log_likelihoods(sd, told):
     fit = inference.fit(
         noisy(round_hill, sd, told), BOX, surrogate="log_likelihood", budget=60, **QUIET
@@ -138,17 +135,17 @@ def test_noisy_log_likelihoods(sd, told):
     assert_near(fit, round_hill, 1.0, 2.0)
 
 
-@pytest.mark.parametrize("bad", [-np.inf, -1e16])
-def test_impossible_beyond_an_edge(bad):
-    def simulate(theta, seeds):
-        values = beside_a_cliff(theta)
-        return np.where(np.isfinite(values), values, bad)
-
-    fit = inference.fit(simulate, BOX, surrogate="log_likelihood", budget=50, **QUIET)
+def test_impossible_beyond_an_edge():
+    fit = inference.fit(
+        lambda theta, seeds: beside_a_cliff(theta),
+        BOX,
+        surrogate="log_likelihood",
+        budget=50,
+        **QUIET,
+    )
     assert_near(fit, beside_a_cliff, 0.5, 1.5)
-    if bad == -np.inf:
-        assert fit.failures.keys() == {"impossible"}
-        assert not any("failed" in said for said in fit.warnings)
+    assert fit.failures.keys() == {"impossible"}
+    assert not any("failed" in said for said in fit.warnings)
 
 
 def test_what_is_not_known_explains_nothing():
@@ -167,15 +164,6 @@ def test_what_is_not_known_explains_nothing():
         None, BOX, surrogate="log_likelihood", budget=0, earlier=(theta, rough), warn=False
     )
     assert UNCERTAIN in told.warnings and UNCERTAIN not in fit.warnings
-
-
-@pytest.mark.parametrize("sampler", ["nuts", "emcee"])
-def test_samplers_agree_with_quadrature(sampler):
-    fit = inference.fit_losses(*trials(), DECAY, noise=SD)
-    drawn, exact = (fit.sample(name)["posterior"] for name in (sampler, "quadrature"))
-    assert drawn.attrs["status"] == "converged"
-    for name in DECAY.names:
-        assert abs(drawn[name].mean() - exact[name].mean()) < 0.2 * exact[name].std()
 
 
 def test_depths_are_compressed_and_back():
@@ -203,48 +191,21 @@ def test_losses_as_output_are_sent_to_fit_losses():
     assert fit.status != "fitted"
 
 
-@pytest.mark.parametrize(("sign", "said"), [(1.0, True), (-1.0, False)])
-def test_minus_a_log_likelihood_as_discrepancy_is_sent_to_log_likelihood(sign, said):
-    def minus(observed, simulated):
-        return sign * float(simulated[0])
-
+def test_minus_a_log_likelihood_as_discrepancy_is_sent_to_log_likelihood():
     theta, loss = trials()
-    values = -1.0 - loss[:, None]
-    options = {"discrepancy": minus, "earlier": (theta, values)}
-    fit = inference.fit(None, DECAY, [0.0], budget=0, **options, **QUIET)
-    assert (NEGATIVE in fit.warnings) == said and "log_likelihood" in NEGATIVE
+    given = {"budget": 0, "earlier": (theta, -1.0 - loss[:, None]), **QUIET}
+    for sign in (1.0, -1.0):
+        fit = inference.fit(
+            None, DECAY, [0.0], discrepancy=lambda _, run, s=sign: s * float(run[0]), **given
+        )
+        assert (NEGATIVE in fit.warnings) == (sign > 0.0) and "log_likelihood" in NEGATIVE
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({}, "either noise=.* or n="),
-        ({"noise": 1.0, "n": 3}, "either noise=.* or n="),
-        ({"noise": 0.0}, "noise must be positive"),
-        ({"n": 0}, "n must be an integer"),
-    ],
-)
-def test_bad_arguments_of_fit_losses(given, said):
-    with pytest.raises(ValueError, match=said):
-        inference.fit_losses(*trials(), DECAY, **given)
-
-
-def test_what_is_no_loss_and_no_log_likelihood_is_refused():
-    theta, loss = trials()
-    with pytest.raises(ValueError, match="sums of squares, from 0.*log_likelihood"):
-        inference.fit_losses(theta, -loss, DECAY, noise=SD)
-    with pytest.raises(ValueError, match="sums of squares, positive"):
-        inference.fit_losses(theta, 0.0 * loss, DECAY, n=30)
-    with pytest.raises(ValueError, match=r"loss must have shape \(60,\).*got \(59,\)"):
-        inference.fit_losses(theta, loss[1:], DECAY, noise=SD)
-    with pytest.raises(ValueError, match="loss must hold 3 finite numbers, got 0 of 60"):
-        inference.fit_losses(theta, np.nan * loss, DECAY, noise=SD)
-    with pytest.raises(ValueError, match="takes no observed"):
-        inference.fit(noisy(banana, 0.0), BOX, [0.0], surrogate="log_likelihood")
-    with pytest.raises(ValueError, match="observed must be .*fit_losses"):
-        inference.fit(noisy(banana, 0.0), BOX)
+def test_a_simulator_of_log_likelihoods_returns_one_or_two_numbers():
     with pytest.raises(ValueError, match=r"two with its sd, got a signal of \(3,\)"):
         inference.fit(lambda t, s: np.zeros((len(s), 3)), BOX, surrogate="log_likelihood")
+    with pytest.raises(ValueError, match="observed must be .*fit_losses"):
+        inference.fit(noisy(banana, 0.0), BOX)
 
 
 def test_the_guide_s_example():

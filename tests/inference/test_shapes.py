@@ -32,8 +32,7 @@ def of_samples(observed, simulated):
     return float(np.sum((observed - simulated) ** 2))
 
 
-@pytest.mark.parametrize("in_rounds", [True, False])
-@pytest.mark.parametrize("first", [0, 5])
+@pytest.mark.parametrize(("first", "in_rounds"), [(0, True), (5, False)])
 def test_a_signal_of_another_shape_condemns_no_other(prior, observed, simulate, first, in_rounds):
     """Whichever is told first: the discrepancy takes all, and all are learned from."""
     fit = inference.fit(
@@ -55,14 +54,13 @@ def test_a_signal_of_another_shape_condemns_no_other(prior, observed, simulate, 
         assert fit.history.discrepancy[row] == due
 
 
-@pytest.mark.parametrize("in_rounds", [True, False])
-@pytest.mark.parametrize("executor", [False, True])
 @pytest.mark.parametrize(
-    "how",
+    ("how", "executor", "in_rounds"),
     [
-        lambda signal: signal[:29],
-        lambda signal: signal[:, None] + np.zeros(30),  # what is returned is then no number
-        lambda signal: np.zeros((3, 0)),
+        (lambda signal: signal[:29], False, True),
+        # what is returned is then no number
+        (lambda signal: signal[:, None] + np.zeros(30), True, True),
+        (lambda signal: np.zeros((3, 0)), True, False),
     ],
 )
 def test_a_run_on_which_the_discrepancy_fails_costs_itself_and_is_named(
@@ -89,12 +87,9 @@ def test_a_run_on_which_the_discrepancy_fails_costs_itself_and_is_named(
     assert str(float(fit.simulations["slope"][0])) in told
 
 
-@pytest.mark.parametrize("batch", [1, 3])
-def test_a_discrepancy_that_fails_on_all_of_the_first_runs_ends_the_fit(
-    prior, observed, simulate, batch
-):
+def test_a_discrepancy_that_fails_on_all_of_the_first_runs_ends_the_fit(prior, observed, simulate):
     """It would fail on all others, and each costs a simulation."""
-    made = []
+    made, batch = [], 3
 
     def counted(theta, seed):
         made.append(seed)

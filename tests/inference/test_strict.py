@@ -44,14 +44,9 @@ def printed(samplers, flags, variables):
     return done.stdout
 
 
-@pytest.mark.parametrize(
-    "samplers",
-    [
-        pytest.param(("quadrature",), id="quadrature"),
-        pytest.param(("nuts", "emcee"), id="chains", marks=pytest.mark.slow),
-    ],
-)
-def test_a_fit_and_its_draws_are_the_same_under_every_strictness(samplers):
+@pytest.mark.slow
+def test_a_fit_and_its_draws_are_the_same_under_every_strictness():
+    samplers = "quadrature", "nuts", "emcee"
     plain = printed(samplers, [], {})
     assert len(plain.splitlines()) == 2 * len(samplers)
     assert printed(samplers, ["-W", "error", "-OO"], STRICT) == plain

@@ -1,3 +1,5 @@
+"""What a bank keeps, for whom, and that nothing is simulated twice."""
+
 import re
 import sqlite3
 import subprocess
@@ -17,19 +19,6 @@ BOOM = raised(OSError("boom"))
 THETA = {"b": 0.1 + 0.2, "a": 1e-3}
 
 
-WRITE_50 = """
-import sys
-import numpy as np
-from bolfi_liquids import inference
-from bolfi_liquids.inference import simulations
-
-path, first = sys.argv[1], int(sys.argv[2])
-with inference.SimulationBank(path) as bank:
-    for seed in range(first, first + 50):
-        bank.put("id", {"a": 1.0}, seed, simulations.Simulation(np.zeros(3), None, 0.0))
-"""
-
-
 def test_keeps_signals_exactly(tmp_path):
     signal = np.random.default_rng(0).normal(size=(5, 2)).astype(np.float32)
     with inference.SimulationBank(tmp_path / "b.sqlite") as bank:
@@ -42,14 +31,12 @@ def test_keeps_signals_exactly(tmp_path):
     np.testing.assert_array_equal(found.signal, signal)
 
 
-@pytest.mark.parametrize(
-    ("identity", "theta", "seed"),
-    [("other", THETA, 7), ("id", {"a": 1e-3, "b": 0.3}, 7), ("id", THETA, 8)],
-)
-def test_looks_up_exactly(identity, theta, seed):
+def test_looks_up_exactly():
+    others = [("other", THETA, 7), ("id", {"a": 1e-3, "b": 0.3}, 7), ("id", THETA, 8)]
     with inference.SimulationBank() as bank:
         bank.put("id", THETA, 7, simulations.Simulation(np.zeros(2), None, 0.0))
-        assert bank.get(identity, theta, seed) is None
+        assert bank.holds("id") and not bank.holds("other")
+        assert [bank.get(*key) for key in others] == [None] * 3
 
 
 def test_keeps_failures_until_a_signal_comes_and_then_that():
@@ -61,17 +48,6 @@ def test_keeps_failures_until_a_signal_comes_and_then_that():
         kept = bank.get("id", THETA, 0)
         assert kept is not None and kept.error is None
         np.testing.assert_array_equal(kept.signal, np.full(2, 1.0))
-
-
-def test_processes_may_share_a_file(tmp_path):
-    path = tmp_path / "shared.sqlite"
-    workers = [
-        subprocess.Popen([sys.executable, "-c", WRITE_50, str(path), first])
-        for first in ("0", "25")
-    ]
-    assert [worker.wait() for worker in workers] == [0, 0]
-    with inference.SimulationBank(path) as bank:
-        assert len(bank) == 75
 
 
 def test_other_files_are_refused_and_left_alone(tmp_path):
@@ -88,24 +64,15 @@ def test_other_files_are_refused_and_left_alone(tmp_path):
     assert (foreign.read_bytes(), text.read_bytes()) == before
 
 
-@pytest.mark.parametrize("name", [".", "missing/b.sqlite"])
 @pytest.mark.parametrize("kind", ["simulation bank", "replicate store"])
-def test_a_path_that_cannot_be_used_is_named(tmp_path, simulate, prior, kind, name):
-    path = tmp_path / name
+def test_a_path_that_cannot_be_used_is_named(tmp_path, simulate, prior, kind):
+    path = tmp_path / "missing" / "b.sqlite"
     message = rf"{re.escape(str(path))} cannot be used as a {kind} \(unable to open"
     with pytest.raises(ValueError, match=message):
         if kind == "simulation bank":
             inference.fit(simulate, prior, np.zeros(30), bank=path)
         else:
             inference.replicates(print, simulate, prior, 2, store=path)
-
-
-@pytest.mark.parametrize("path", [5, None, ""])
-def test_what_is_no_path_is_refused(path):
-    with pytest.raises(
-        ValueError, match=f"a simulation bank needs the path of a file, got {path!r}"
-    ):
-        inference.SimulationBank(path)
 
 
 def test_all_simulations_of_one_identity(tmp_path):
@@ -131,11 +98,11 @@ def test_all_simulations_of_one_identity(tmp_path):
 
 def test_simulations_that_are_not_alike_are_refused():
     with inference.SimulationBank() as bank:
-        with pytest.raises(ValueError, match="identity='id', got none"):
+        with pytest.raises(ValueError, match="identity='id', got None"):
             bank.simulations("id")
         for a in (2, 3):
             bank.put("id", {"a": a}, 0, simulations.Simulation(np.zeros(a), None, 0.0))
-        with pytest.raises(ValueError, match=r"got a -> \[2\]; a -> \[3\]"):
+        with pytest.raises(ValueError, match=r"a -> \[2\].*a -> \[3\]"):
             bank.simulations("id")
 
 
@@ -299,8 +266,6 @@ def test_the_same_job_twice_in_a_batch_is_simulated_once():
     "change",
     [
         "signal = zeroblob(length(signal))",
-        "seconds = 2 * seconds",
-        "error = 'raised'",
         "shape='[1]'",
     ],
 )
@@ -327,11 +292,3 @@ def test_a_bank_that_is_opened_is_closed_and_one_that_is_given_stays_open(tmp_pa
         with open_compute(bank=bank) as compute:
             assert compute.bank is bank
         assert len(bank) == 0
-
-
-@pytest.mark.parametrize(
-    "given", [{"batch": 0}, {"timeout": -1.0}, {"executor": 3}, {"bank": 3}, {"bank": ""}]
-)
-def test_simulations_that_cannot_be_made_so_are_refused(given):
-    with pytest.raises(ValueError, match=next(iter(given))), open_compute(**given):
-        pass

@@ -13,11 +13,11 @@ import pytest
 from bolfi_liquids import inference
 
 BUDGET, BATCH = 20, 3
-POOLS = "threads", "processes"
+POOLS = "threads", "processes", "none"
 
 # One process imports the engine, and a fork of it makes each run; JAX has not started then.
 SERVER = """
-import functools, json, multiprocessing, os, sys, time
+import contextlib, functools, json, multiprocessing, os, sys, time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 import numpy as np
 
@@ -35,13 +35,16 @@ def run(log, bank, out, pool):
 
     os.setsid()  # so that the workers can be killed with it
     spawn = multiprocessing.get_context("spawn")
-    make = ThreadPoolExecutor if pool == "threads" else functools.partial(
-        ProcessPoolExecutor, mp_context=spawn)
+    make = {
+        "threads": ThreadPoolExecutor,
+        "processes": functools.partial(ProcessPoolExecutor, mp_context=spawn),
+        "none": lambda workers: contextlib.nullcontext(),
+    }[pool]
     prior = inference.Prior({"a": dist.Uniform(-1.0, 1.0)})
     with make(BATCH) as executor:
         fit = inference.fit(
             functools.partial(simulate, log), prior, 0.3 * np.linspace(0, 1, 20),
-            budget=BUDGET, batch=BATCH, bank=bank, executor=executor)
+            budget=BUDGET, batch=BATCH, confirm=0, bank=bank, executor=executor)
     draws = fit.sample("emcee", chains=2, draws=64, warmup=20)["posterior"]["a"]
     np.savez(out, best=fit.best["a"], draws=draws, tried=fit.simulations["a"],
              signals=fit.simulations["signal"], seeds=fit.simulations["seed"])
@@ -132,13 +135,13 @@ def kill_in_the_middle(server, files, pool, finished, delay):
 
 @pytest.mark.minutes
 def test_killed_at_any_moment(tmp_path, server, undisturbed):
-    """At a random moment after so many of 20 simulations; with threads and with processes.
+    """At a random moment after so many of 20 simulations; with threads, processes and neither.
 
-    What was running, at most one per worker, is simulated again; nothing else is.
+    What was running, at most one per worker or one batch, is simulated again; nothing else is.
     """
     chance = np.random.default_rng()
     for finished in range(BUDGET):
-        pool = POOLS[finished % 2]
+        pool = POOLS[finished % 3]
         delay = chance.uniform(0.0, 0.1 if finished else 1.0)
         case = f"{pool}, {finished} finished, {delay:.4f} s"
         log, bank, out = (tmp_path / f"{finished}.{suffix}" for suffix in ("log", "sqlite", "npz"))

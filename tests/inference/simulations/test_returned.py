@@ -1,9 +1,8 @@
 """What a simulator returns: converted, or refused as the one run that it is, wherever it ran."""
 
+import contextlib
 import importlib
-import json
 import multiprocessing
-import random
 import sys
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -13,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from bolfi_liquids.inference.arguments import Unusable, checked_integer, float64
+from bolfi_liquids.inference.arguments import Unusable, float64
 from bolfi_liquids.inference.simulations import (
     Compute,
     Job,
@@ -32,28 +31,21 @@ from bolfi_liquids import inference
 MASKED = np.ma.masked_array([1.0, 1e36], [False, True])
 
 NUMBERS = {
-    "integers": (np.array([1, 2], np.int16), [1.0, 2.0]),
     "booleans": ([True, False], [1.0, 0.0]),
-    "half": (np.array([0.5, 2.0], np.float16), [0.5, 2.0]),
     "objects": (np.array([1, Decimal("2.5")], object), [1.0, 2.5]),
     "a missing object": (np.array([1.0, None], object), [1.0, np.nan]),
     "masked": (MASKED, [1.0, np.nan]),
-    "masked integers": (np.ma.masked_array([1, 7], [False, True]), [1.0, np.nan]),
     "a list of masked rows": ([MASKED, MASKED], [[1.0, np.nan]] * 2),
-    "the constant": ([1.0, np.ma.masked], [1.0, np.nan]),
     "lists of masked rows": ([[MASKED, MASKED]] * 2, [[[1.0, np.nan]] * 2] * 2),
     "tuples of masked rows, and others": (
         ([(MASKED,)], [[[3, 4]]]),
         [[[[1.0, np.nan]]], [[[3, 4]]]],
     ),
     "the constant in a row": ([[1.0, np.ma.masked], [2.0, 3.0]], [[1.0, np.nan], [2.0, 3.0]]),
-    "masked numbers": ([[np.ma.masked_array(7.0, True)]], [[np.nan]]),
-    "nothing in a row": ([[1.0, None], [2.0, 3.0]], [[1.0, np.nan], [2.0, 3.0]]),
     "pandas.NA": ([[1.0, pd.NA], [2.0, 3.0]], [[1.0, np.nan], [2.0, 3.0]]),
     "a nullable column": (pd.Series([1, None], dtype="Int64"), [1.0, np.nan]),
     "nullable columns": (pd.DataFrame({"x": [1.5, None]}, dtype="Float64"), [[1.5], [np.nan]]),
     "labelled and masked": (xr.DataArray(MASKED, dims="time"), [1.0, np.nan]),
-    "a list of labelled": ([xr.DataArray([1.0, np.nan], dims="time")], [[1.0, np.nan]]),
     "labelled chunks that are masked": (
         xr.DataArray(masked_chunks([1.0, 1e36], [False, True])),
         [1.0, np.nan],
@@ -61,10 +53,6 @@ NUMBERS = {
     "a list of chunks that are masked": (
         [masked_chunks([1.0, 1e36], [False, True])],
         [[1.0, np.nan]],
-    ),
-    "chunks that are masked": (
-        masked_chunks([1.0, 1e36], [False, True]),
-        [1.0, np.nan],
     ),
     "labelled": (xr.DataArray([1.0, 2.0], dims="time"), [1.0, 2.0]),
     "a table": (pd.DataFrame({"x": [1, 2], "y": [3, 4]}), [[1.0, 3.0], [2.0, 4.0]]),
@@ -75,13 +63,12 @@ NUMBERS = {
 
 
 @pytest.mark.filterwarnings("ignore:Warning. converting a masked element")  # NumPy says so
-@pytest.mark.parametrize("case", NUMBERS)
-def test_numbers_of_any_kind_become_float64(case):
-    given, due = NUMBERS[case]
-    with np.errstate(all="raise"):  # as a user may have it
-        found = float64(given)
-    assert found.dtype == np.float64 and type(found) is np.ndarray
-    np.testing.assert_array_equal(found, np.array(due))
+def test_numbers_of_any_kind_become_float64():
+    for case, (given, due) in NUMBERS.items():
+        with np.errstate(all="raise"):  # as a user may have it
+            found = float64(given)
+        assert found.dtype == np.float64 and type(found) is np.ndarray, case
+        np.testing.assert_array_equal(found, np.array(due), err_msg=case)
 
 
 OTHERS = {
@@ -103,10 +90,18 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("case", OTHERS)
-def test_what_would_lose_or_invent_something_is_refused(case):
-    with pytest.raises(Unusable):
-        float64(OTHERS[case])
+def test_what_would_lose_or_invent_something_is_refused():
+    taken = []
+    for case, given in OTHERS.items():
+        with contextlib.suppress(Unusable):
+            taken.append((case, float64(given)))
+    assert not taken
+
+
+def test_integers_of_any_library_are_python_s_own():
+    for seed in (np.int64(7), np.uint8(7), np.array(7), 7):
+        (job,) = jobs({}, [seed])
+        assert job == Job({}, 7) and type(job.seed) is int
 
 
 WORKER_SIDE = """
@@ -192,8 +187,7 @@ SPOILT_SEED = 12
 JOBS = jobs({"a": np.arange(8.0)}, np.arange(10, 18))
 
 
-@pytest.mark.parametrize("shape", [(5,), None])
-@pytest.mark.parametrize("single", [True, False], ids=["one by one", "in batches"])
+@pytest.mark.parametrize(("single", "shape"), [(True, (5,)), (False, None)])
 @pytest.mark.parametrize("place", PLACES)
 def test_a_run_without_a_signal_costs_itself_alone(worker_side, place, single, shape):
     with place() as executor:
@@ -288,42 +282,6 @@ def test_another_simulator_s_signal_in_the_bank_costs_itself_alone():
     assert "(9,)" in str(found[3].error)
 
 
-@pytest.mark.parametrize("place", [nowhere_else, threads])
-def test_a_simulator_of_single_runs_gets_python_s_own_numbers(place):
-    got = []
-
-    def simulate(theta, seed):
-        random.seed(seed)
-        json.dumps({"seed": seed, **theta})
-        got.append(type(seed))
-        return [random.random()]
-
-    with place() as executor, inference.SimulationBank() as bank:
-        run_missing(OneByOne(simulate), JOBS, Compute(bank=bank, batch=4, executor=executor), (1,))
-    assert got == [int] * len(JOBS)
-
-
-@pytest.mark.parametrize("seed", [np.int64(7), np.uint8(7), np.array(7), 7])
-def test_seeds_of_every_integer_type_are_taken(prior, observed, seed):
-    assert type(inference.Bolfi(prior, observed, seed=seed).seed) is int
-    assert jobs({}, [seed]) == [Job({}, 7)] and type(jobs({}, [seed])[0].seed) is int
-
-
-@pytest.mark.parametrize(
-    "seed", [2**31, 2**80, -1, np.uint64(2**63), 1.0, np.float64(3), True, "7", None, [7, 8]]
-)
-def test_other_seeds_are_refused_before_anything_is_simulated(prior, observed, seed):
-    def simulate(theta, seeds):
-        raise AssertionError("it was called")
-
-    with pytest.raises(ValueError, match="seed must be an integer from 0 to 2147483647"):
-        inference.fit(simulate, prior, observed, seed=seed)
-    with pytest.raises(ValueError, match="seed must be an integer from 0"):
-        jobs({}, [seed])
-    with pytest.raises(ValueError, match="seed must be an integer from 0"):
-        checked_integer("seed", seed, 0)
-
-
 def test_a_bad_signal_among_those_that_are_told_is_a_failed_run(prior, observed, simulate):
     engine = inference.Bolfi(prior, observed)
     theta = engine.ask(6)
@@ -331,7 +289,7 @@ def test_a_bad_signal_among_those_that_are_told_is_a_failed_run(prior, observed,
     engine.tell(theta, [good[0], None, good[2][:29], good[3] + 0j, good[4], "diverged"])
     assert engine.told == 6 and engine.succeeded == 2
     assert [error.partition(":")[0] for error in engine.history.errors if error] == ["unusable"] * 4
-    with pytest.raises(ValueError, match=r"signals must have shape \(6, 30\)|array of numbers"):
+    with pytest.raises(ValueError, match=r"signals .*\(6, 30\)"):
         engine.tell(theta, [row[:29] for row in good])
     assert engine.told == 6
 
@@ -346,30 +304,6 @@ def test_a_discrepancy_that_is_no_real_number_is_refused(prior, observed, simula
 def draws_of_prior(observed, seed):
     rng = np.random.default_rng(seed)
     return {"slope": rng.uniform(-1.0, 1.0, 31), "offset": rng.random(31)}
-
-
-def test_a_replicate_whose_data_are_none_costs_itself_alone(tmp_path, prior, simulate):
-    calls = []
-
-    def spoilt(theta, seeds):
-        calls.append(seeds)
-        return None if len(calls) in (1, 3) else simulate(theta, seeds)
-
-    options = {"draws": 15, "independent": True, "progress": False}
-    made = inference.replicates(draws_of_prior, spoilt, prior, 6, **options)
-    assert [one.number for one in made.failed] == [0, 2] and len(made.finished) == 4
-    assert all(str(int(calls[one.number][0])) in str(one.error) for one in made.failed)
-    options["store"] = tmp_path / "kept.sqlite"
-    licence = tmp_path / "licence"
-
-    def licensed(theta, seeds):
-        return simulate(theta, seeds) if licence.exists() else None
-
-    with pytest.raises(ValueError, match="got None"):
-        inference.replicates(draws_of_prior, licensed, prior, 6, **options)
-    licence.touch()
-    mended = inference.replicates(draws_of_prior, licensed, prior, 6, **options)
-    assert not mended.failed  # what failed in this way was not kept
 
 
 def test_observations_of_replicates_are_numbers_by_the_same_rules(prior, simulate):

@@ -1,15 +1,11 @@
 """On an executor, a simulator that asks for it gets several simulations in a call."""
 
-import importlib
-import multiprocessing
-import time
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-import pytest
 from bolfi_liquids.inference import SimulationBank
 from bolfi_liquids.inference.simulations import BatchSimulator, Compute, Job, run_missing
-from bolfi_liquids.inference.simulations.job import for_engine, run_batch
+from bolfi_liquids.inference.simulations.job import run_batch
 
 
 class Marching:
@@ -33,12 +29,11 @@ def run(simulator, count, pool):
     return found
 
 
-@pytest.mark.parametrize(("count", "calls"), [(10, [4, 4, 2]), (8, [4, 4]), (5, [4, 1]), (2, [2])])
-def test_calls_are_as_large_as_the_simulator_likes(count, calls):
+def test_calls_are_as_large_as_the_simulator_likes():
     with ThreadPoolExecutor(2) as pool:
-        found = run(Marching(), count, pool)
-    assert [one.signal[0] for one in found] == list(range(count))
-    assert [one.signal[1] for one in found] == [size for size in calls for _ in range(size)]
+        found = run(Marching(), 10, pool)
+    assert [one.signal[0] for one in found] == list(range(10))
+    assert [one.signal[1] for one in found] == [4.0] * 8 + [2.0] * 2
 
 
 def test_a_run_that_fails_costs_only_itself():
@@ -47,99 +42,6 @@ def test_a_run_that_fails_costs_only_itself():
     assert [one.signal is None for one in found] == [seed == 2 for seed in range(8)]
     assert "went wrong" in found[2].error.text
     assert [one.signal[1] for one in found if one.signal is not None] == [1.0] * 3 + [4.0] * 4
-
-
-@pytest.mark.parametrize("together", [0, 2.5, "four"])
-def test_what_is_no_number_of_simulations_is_refused(together):
-    with pytest.raises(ValueError, match="together"):
-        BatchSimulator(Marching().simulate, together)
-
-
-@pytest.mark.parametrize(
-    ("simulate", "options"),
-    [
-        (Marching().simulate, {"vectorised": False, "together": 4}),
-        (Marching().simulate, {"vectorised": False, "together": "four"}),
-        (BatchSimulator(Marching().simulate), {"together": "four"}),
-        (BatchSimulator(Marching().simulate), {"time_limit": max}),
-        (BatchSimulator(Marching().simulate), {"vectorised": False}),
-    ],
-)
-def test_what_contradicts_a_simulator_is_refused(simulate, options):
-    with pytest.raises(ValueError, match="leave"):
-        for_engine(simulate, **options)
-
-
-@pytest.mark.parametrize("neutral", [3, "drag", ["drag"]])
-def test_neutral_values_without_names_are_refused(neutral):
-    with pytest.raises(ValueError, match="neutral"):
-        BatchSimulator(Marching().simulate, neutral=neutral)
-
-
-def test_a_call_may_take_as_many_times_as_long_as_it_makes_simulations():
-    """Four that sleep .25 s each: a call that is given less is repeated one by one."""
-    calls = []
-
-    def sleepy(theta, seeds):
-        calls.append(len(seeds))
-        time.sleep(0.25 * len(seeds))
-        return seeds[:, None].astype(float)
-
-    four = BatchSimulator(sleepy, 4)
-    jobs = [Job({"a": 1.0}, seed) for seed in range(4)]
-    with SimulationBank() as bank, ThreadPoolExecutor(1) as pool:
-        kept = Compute(bank=bank, executor=pool, timeout=0.6)
-        assert all(one.error is None for one in run_missing(four, jobs, kept, (1,)))
-        assert calls == [4]
-        kept = Compute(bank=bank, executor=pool, timeout=0.05)
-        late = run_missing(four, jobs, kept, (1,), identity="short")
-        assert all("no signal after" in one.error.text for one in late)
-        assert calls == [4, 4, 1, 1, 1, 1]
-
-
-MORTAL = """
-import os
-import numpy as np
-
-class Mortal:
-    def __init__(self, made, mended):
-        self.made, self.mended = made, mended
-
-    def __call__(self, theta, seeds):
-        if 9 in seeds and not os.path.exists(self.mended):
-            os._exit(1)
-        with open(self.made, "a") as file:
-            file.write("".join(f"{seed}\\n" for seed in seeds))
-        return np.array(seeds, float)[:, None]
-"""
-
-
-@pytest.mark.slow
-def test_a_worker_that_is_killed_loses_its_call_and_what_was_stored_is_not_repeated(
-    tmp_path, monkeypatch
-):
-    (tmp_path / "mortal.py").write_text(MORTAL)
-    monkeypatch.syspath_prepend(tmp_path)
-    made, mended = tmp_path / "made", tmp_path / "mended"
-    simulate = BatchSimulator(importlib.import_module("mortal").Mortal(str(made), str(mended)), 4)
-    jobs = [Job({"a": 1.0}, seed) for seed in range(12)]
-
-    def run_all():
-        spawn = multiprocessing.get_context("spawn")
-        with (
-            SimulationBank(tmp_path / "bank.sqlite") as bank,
-            ProcessPoolExecutor(1, mp_context=spawn) as pool,
-        ):
-            return run_missing(simulate, jobs, Compute(bank=bank, executor=pool), (1,))
-
-    with pytest.raises(RuntimeError, match="lost its workers"):
-        run_all()
-    with SimulationBank(tmp_path / "bank.sqlite") as bank:
-        stored = set(bank.simulations("").seeds)
-    assert stored == set(range(8))
-    mended.touch()
-    assert [one.signal[0] for one in run_all()] == list(range(12))
-    assert sorted(map(int, made.read_text().split())) == list(range(12))
 
 
 class Told:
