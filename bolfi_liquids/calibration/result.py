@@ -31,7 +31,7 @@ class Calibration:
 
     Attributes:
         run: What it was made from.
-        tree: posterior.nc, in ArviZ's schema; groups as in `calibration.posterior_file`.
+        tree: posterior.nc, in ArviZ's schema; groups as in `calibration.engine_fit`.
         summary: The section "calibrate" of summary.json.
     """
 

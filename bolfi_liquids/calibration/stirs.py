@@ -1,4 +1,4 @@
-"""Stirred recordings as experiments that the engine can criticise."""
+"""Stirred recordings as experiments that the engine can criticise, and the noise in them."""
 
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
@@ -37,6 +37,12 @@ RATE_TOLERANCE = 0.02
 
 SPEED_BINS = 3
 """Stretches of like speed that a stir is cut into, beside its strokes."""
+
+DIFFERENCE_ORDER = 3
+"""Of the differences that leave the noise of a smooth signal."""
+
+DIFFERENCE_GAIN = np.sqrt(20.0)
+"""Of third differences on white noise: sqrt(binomial(6, 3))."""
 
 
 def camera_noise(recordings: Sequence[Recording]) -> "AutoregressiveNoise":
@@ -195,3 +201,51 @@ def same_experiment(one: Recording, other: Recording) -> bool:
     apart = np.abs(one.gripper.position - other.gripper.position).max()
     late = np.abs((one.time - one.time[0]) - (other.time - other.time[0])).max()
     return bool(apart < PATH_TOLERANCE and late < TIME_TOLERANCE)
+
+
+def rms(values: NDArray) -> float:
+    """Root mean square of the values that are not NaN."""
+    return float(np.sqrt(np.nanmean(np.square(values))))
+
+
+def sensor_noise(inclination: NDArray) -> float:
+    """Standard deviation of white noise in a smooth signal.
+
+    Third differences remove whatever is locally quadratic and leave the noise, times a known
+    gain (von Neumann et al. 1941, with differences of a higher order). On the bundled
+    recordings this finds their 0.10 degrees within 1 %.
+
+    Args:
+        inclination: Samples of one recording, shape (T, planes), NaN where missing.
+
+    Returns:
+        Standard deviation in the signal's unit, over all planes; 0 where no four neighbouring
+        samples were seen.
+    """
+    differences = np.diff(inclination, DIFFERENCE_ORDER, axis=0)
+    return rms(differences) / float(DIFFERENCE_GAIN) if np.isfinite(differences).any() else 0.0
+
+
+def replicate_noise(replicates: NDArray) -> float:
+    """Expected RMS difference between two simulations that differ by their seeds only.
+
+    Args:
+        replicates: Signals, shape (seeds, ...), at least two seeds.
+
+    Returns:
+        RMS in the signal's unit: the square root of twice the variance between seeds, as the
+        liquid in the cup has an initial packing of its own, too.
+    """
+    return float(np.sqrt(2.0 * np.mean(np.var(replicates, axis=0, ddof=1))))
+
+
+def irreducible_rms(recordings_inclination: list[NDArray], replicates: NDArray) -> float:
+    """RMS that the right model at the right parameters would leave: both noises in quadrature.
+
+    Args:
+        recordings_inclination: Observed samples of each recording, shapes (T, planes).
+        replicates: Simulated signals of all recordings joined along time, (seeds, T, planes).
+    """
+    weights = [np.isfinite(seen).sum() for seen in recordings_inclination]
+    variance = np.average([sensor_noise(y) ** 2 for y in recordings_inclination], weights=weights)
+    return float(np.sqrt(variance + replicate_noise(replicates) ** 2))

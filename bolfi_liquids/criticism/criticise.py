@@ -120,7 +120,6 @@ def _find(
         inputs.baseline,
         inputs.stirring.setups[0].particles,
         calibration.prior,
-        effects_of("stir"),
         compute=compute,
         report=report,
     )

@@ -8,14 +8,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..calibration.model_error import check_baseline, check_rig
+from ..calibration.model_error import check_beside
 from ..calibration.result import Calibration
 from ..calibration.stirs import camera_noise, names_of_effects
 from ..errors import Argument, InputError
 from ..inputs.pour_table import Pours, PourTable, check_scene, table_and_cups, table_of
 from ..inputs.recording import Recording
 from ..inputs.settings import FALSE_ALARM_RATE, CriticismSettings
-from ..simulators import StirSimulator, same_liquid, stir_simulator
+from ..simulators import StirSimulator, stir_simulator
 
 if TYPE_CHECKING:
     from ..inference.criticism import AutoregressiveNoise
@@ -117,7 +117,7 @@ def open_inputs(
     used = {recording.hash for recording in (*stirring.recordings, *held_out)}
     clean = {recording.hash: recording for recording in baseline if recording.hash not in used}
     left_out = dict.fromkeys(one.path.name for one in baseline if one.hash in used)
-    check_baseline(stirring, tuple(clean.values()))
+    check_beside(stirring, tuple(clean.values()), "baseline")
     table, cups = table_and_cups(poured[0], cups)
     held_out_table = table_of(poured[1], Argument("held_out_pours"))
     _check_pours(table, held_out_table, settings)
@@ -137,7 +137,6 @@ def open_inputs(
 
 
 def _check_held_out(stirring: StirSimulator, held_out: Sequence[Recording]) -> None:
-    fitted = {recording.hash for recording in stirring.recordings}
     seen: set[str] = set()
     for recording in held_out:
         if {recording.hash, recording.path.name} & seen:
@@ -147,21 +146,7 @@ def _check_held_out(stirring: StirSimulator, held_out: Sequence[Recording]) -> N
                 fix="give each recording once, and each a name of its own",
             )
         seen |= {recording.hash, recording.path.name}
-        if recording.hash in fitted:
-            raise InputError(
-                "is what the run was calibrated on",
-                where=Argument(f"held_out {recording.path}"),
-                fix="hold out another recording: nothing can be proved on data that were fitted",
-            )
-        if not same_liquid(recording, stirring.recordings[0]):
-            density = stirring.recordings[0].number("liquid_density")
-            raise InputError(
-                f"liquid_density is {recording.number('liquid_density'):g} kg/m3, but "
-                f"{density:g} in the run",
-                where=Argument(f"held_out {recording.path}"),
-                fix="hold out a recording of the same liquid",
-            )
-        check_rig(stirring, recording, Argument(f"held_out {recording.path}"))
+    check_beside(stirring, held_out, "held_out")
 
 
 def check_effects(settings: CriticismSettings) -> None:

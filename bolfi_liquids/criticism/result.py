@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..calibration.result import Calibration
-from ..calibration.summary import Fitted
 from ..drawing import shown
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..run.run import Run, RunOrPath
@@ -100,25 +99,20 @@ class Criticism:
         """The extended calibration, with the accepted effects; the base one without."""
         if not self.summary.accepted:
             return self.base
+        gap, numbers = self.summary.gap, {}
+        # what is told of ties alone is of none that was accepted, and pours mend no stir
+        of_a_tie = self.summary.stirs.verdict is VerdictKind.TIE and not self.summary.requested
+        if gap.rms_after is not None and not of_a_tie:
+            numbers = {"fit_rms_deg": gap.rms_after, "noise_deg": gap.noise}
         tree = self.base.tree.copy()
         tree["posterior"] = self.tree["posterior"]
-        posterior = tree["posterior"].to_dataset()
-        summary = self.base.summary.of_posterior(
-            posterior, self.summary.parameters, self.summary.best, self._fitted
+        summary = self.base.summary.extended(
+            tree["posterior"].to_dataset(),
+            parameters=self.summary.parameters,
+            best=self.summary.best,
+            **numbers,
         )
         return replace(self.base, tree=tree, summary=summary)
-
-    @property
-    def _fitted(self) -> Fitted:
-        """How near the accepted effects bring the model to the stirs.
-
-        Effects that pours alone have shown bring it no nearer; what is told then is of ties.
-        """
-        gap, before = self.summary.gap, self.base.summary
-        of_a_tie = self.summary.stirs.verdict is VerdictKind.TIE and not self.summary.requested
-        if gap.rms_after is None or of_a_tie:
-            return Fitted(before.fit_rms_deg, before.noise_deg)
-        return Fitted(gap.rms_after, gap.noise)
 
     def plot_residuals(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Observed less expected against time, before and after, strokes that differ marked."""

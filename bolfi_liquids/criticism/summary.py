@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 import numpy as np
 from pydantic import Field
 
-from ..calibration.noise import rms
+from ..calibration.stirs import rms
 from ..calibration.summary import ParameterSummary
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..inputs.frame import named_faults

@@ -171,7 +171,6 @@ def _clean(bank: inference.SimulationBank) -> list[Clean]:
         recordings,
         MODEL,
         default_prior(),
-        effects_of("stir"),
         compute=Compute(batch=4, bank=bank),
         report=lambda *_: None,
     )

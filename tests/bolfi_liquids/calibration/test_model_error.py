@@ -29,11 +29,12 @@ def stirring(short_recording):
 @pytest.mark.parametrize("viscosity", [0.001, 0.1, 1.0])
 def test_the_usual_error_has_its_size_and_the_correlation_of_the_recording(stirring, viscosity):
     error = model_error(stirring, viscosity)
-    assert error.rms == pytest.approx(np.hypot(1.0, SHORT_PART) * stirring_error(viscosity))
-    assert error.clean == ()
+    assert np.sqrt(error.autocovariance[0]) == pytest.approx(
+        np.hypot(1.0, SHORT_PART) * stirring_error(viscosity)
+    )
     samples = len(stirring.observed)
     at = Layout(np.zeros(samples, int), np.arange(samples))
-    covariance = error.usual.covariance(at)
+    covariance = error.covariance(at)
     assert np.linalg.eigvalsh(covariance)[0] > 0.0
     # seconds at rest, so the neighbours of most samples are like them
     assert covariance[0, 1] > 0.5 * covariance[0, 0]
