@@ -105,23 +105,31 @@ def check_beside(stirring: StirSimulator, recordings: Sequence[Recording], optio
     Args:
         stirring: What the run is calibrated on.
         recordings: Others of the same rig.
-        option: Under which they were given: those of "held_out" are of the same liquid, and those
-            of "baseline" have the same frame rate.
+        option: Under which they were given: those of "held_out" are of the same liquid, each once
+            and under a name of its own; those of "baseline" have the same frame rate.
 
     Raises:
         InputError: One of them is not.
     """
     for recording in recordings:
-        for what, fix in _faults(stirring, recording, option):
+        others = [one for one in recordings if one is not recording]
+        for what, fix in _faults(stirring, recording, others, option):
             raise InputError(what, where=Argument(f"{option} {recording.path}"), fix=fix)
 
 
 def _faults(
-    stirring: StirSimulator, recording: Recording, option: str
+    stirring: StirSimulator, recording: Recording, others: Sequence[Recording], option: str
 ) -> Iterator[tuple[str, str]]:
     """What is wrong with a recording, and what to do about it; see `check_beside`."""
-    first = stirring.recordings[0]
-    if recording.hash in {one.hash for one in stirring.recordings}:
+    first, known = stirring.recordings[0], {one.hash for one in stirring.recordings}
+    if option == "held_out" and any(
+        one.hash == recording.hash or one.path.name == recording.path.name for one in others
+    ):
+        yield (
+            "is held out twice, or has the name of another",
+            "give each recording once, and each a name of its own",
+        )
+    if recording.hash in known:
         yield (
             "is what is calibrated on",
             "give another recording: one that is fitted proves nothing",

@@ -104,6 +104,14 @@ class Calibration:
         return self.run.prior
 
     @property
+    def learned_from(self) -> tuple[dict[str, NDArray], NDArray, NDArray]:
+        """Simulations that succeeded: parameters (n,), signals (n, T, 2) [rad], seeds (n,)."""
+        made = self.tree["simulations"].to_dataset()
+        good = ~made["failed"].to_numpy()
+        theta = {name: made[name].to_numpy()[good] for name in self.prior.names}
+        return theta, made["signal"].to_numpy()[good], made["seed"].to_numpy()[good]
+
+    @property
     def added(self) -> tuple[str, ...]:
         """Effects that a criticism has added to the liquid's parameters."""
         searched = self.tree["simulations"].to_dataset()

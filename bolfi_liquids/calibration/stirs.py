@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import Argument, InputError
+from ..errors import InputError
 from ..inputs.fields import PLANE_NAMES
-from ..inputs.recording import Recording
+from ..inputs.recording import Recording, planned_recording
 from ..inputs.strokes import resting, speed, strokes
 from ..simulators import StirSimulator
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         Experiment,
         Extension,
         Noise,
+        Proposal,
         UsualResidual,
         Window,
     )
@@ -37,6 +38,15 @@ RATE_TOLERANCE = 0.02
 
 SPEED_BINS = 3
 """Stretches of like speed that a stir is cut into, beside its strokes."""
+
+FASTER_FACTOR, SLOWER_FACTOR = 1.6, 0.5
+"""Speeds of proposed stirs, relative to the recording's."""
+
+MAX_SPEED = 0.2
+"""Of a proposed stir [m/s]."""
+
+MAX_RADIUS_SHARE = 0.8
+"""Of the way from the axis to the wall that the stick may go."""
 
 DIFFERENCE_ORDER = 3
 """Of the differences that leave the noise of a smooth signal."""
@@ -98,12 +108,57 @@ def stir_experiment(
     label: str,
 ) -> "Experiment":
     """Recordings of one liquid, with the cameras' noise and the simulator's usual residual."""
-    from ..inference.criticism import Experiment, SumOfNoises
+    from ..inference.criticism import Experiment
 
-    noise: Noise = cameras if usual is None else SumOfNoises((cameras, usual))
     return Experiment(
-        stirring.batched, stirring.observed, noise, stirring.identity, label, windows(stirring)
+        stirring.batched,
+        stirring.observed,
+        _beside(cameras, usual),
+        stirring.identity,
+        label,
+        windows(stirring),
     )
+
+
+def stir_proposals(
+    stirring: StirSimulator, cameras: "AutoregressiveNoise", usual: "UsualResidual | None"
+) -> list["Proposal"]:
+    """The first recording's rig on other paths, seen with the same cameras' noise.
+
+    Args:
+        stirring: What was recorded.
+        cameras: Their noise.
+        usual: The simulator's usual residual on other paths, if it is known.
+    """
+    from ..hardware.motion import circle, star
+    from ..inference.criticism import Proposal
+
+    recording, setup = stirring.recordings[0], stirring.setups[0]
+    fast = float(np.quantile(speed(recording), 0.95))
+    faster, slower = min(FASTER_FACTOR * fast, MAX_SPEED), SLOWER_FACTOR * fast
+    position, height = recording.gripper.position[:, :2], float(recording.gripper.position[0, 2])
+    most = MAX_RADIUS_SHARE * (setup.cup.radius - setup.stick.radius)
+    radius = min(max(float(np.linalg.norm(position, axis=1).max()), 0.01), most)
+    at, near = {"height": height, "radius": radius}, {"height": height, "radius": 0.8 * radius}
+    paths = {
+        f"the star at {100 * faster:.0f} cm/s": star(speed=faster, **at),
+        f"the star at {100 * slower:.0f} cm/s": star(speed=slower, **at),
+        f"a star of 7 points at {100 * fast:.0f} cm/s": star(speed=fast, points=7, **near),
+        f"four circles at {100 * fast:.0f} cm/s": circle(speed=fast, **near),
+    }
+    noise, made = _beside(cameras, usual), []
+    for label, path in paths.items():
+        plan = planned_recording(path.time, path.position, recording.attrs)
+        own, shape = StirSimulator((plan,), (setup,)), (len(path.time), len(PLANE_NAMES))
+        made.append(Proposal(own.batched, noise, shape, own.identity, label))
+    return made
+
+
+def _beside(cameras: "AutoregressiveNoise", usual: "UsualResidual | None") -> "Noise":
+    """The cameras' noise and, where it is known, the simulator's usual residual."""
+    from ..inference.criticism import SumOfNoises
+
+    return cameras if usual is None else SumOfNoises((cameras, usual))
 
 
 def windows(stirring: StirSimulator) -> tuple["Window", ...]:
@@ -147,11 +202,7 @@ def _speeds(recording: Recording) -> Iterator[tuple[str, NDArray[np.bool_]]]:
 
 
 def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Extension"]:
-    """The registered effects that act in a scene, "stir" or "pour".
-
-    Raises:
-        InputError: A name that is not registered.
-    """
+    """The registered effects that act in a scene, "stir" or "pour"; of the named ones only."""
     from ..inference.criticism import Extension
     from ..models import EFFECTS
 
@@ -162,25 +213,11 @@ def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Ext
 
 
 def names_of_effects(scene: str, names: Sequence[str] | None = None) -> list[str]:
-    """Those of `effects_of`, without loading the engine.
-
-    Raises:
-        InputError: A name that is not registered.
-    """
+    """Those of `effects_of`, without loading the engine."""
     from ..models import EFFECTS
 
-    unknown = [name for name in names or () if name not in EFFECTS]
-    if unknown:
-        raise InputError(
-            f"there is no effect {', '.join(map(str, unknown))}",
-            where=Argument("effects"),
-            fix=f"choose from {', '.join(EFFECTS)}",
-        )
-    return [
-        name
-        for name, effect in EFFECTS.items()
-        if scene in effect.scenes and (names is None or name in names)
-    ]
+    considered = EFFECTS if names is None else names
+    return [name for name, one in EFFECTS.items() if scene in one.scenes and name in considered]
 
 
 def same_rate(one: Recording, other: Recording) -> bool:

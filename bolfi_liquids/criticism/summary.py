@@ -13,12 +13,13 @@ from ..inference.criticism.verdict_kind import VerdictKind
 from ..inputs.frame import named_faults
 from ..inputs.settings import FALSE_ALARM_RATE
 from ..run.summary import Number, Section
-from .criticism_file import Sources, best_of
+from .criticism_file import best_of
 
 if TYPE_CHECKING:
     from xarray import DataTree
 
     from .. import inference
+    from .criticism_file import Sources
     from .inputs import Inputs
 
 GRAVEST_FIRST = (VerdictKind.EFFECT, VerdictKind.TIE, VerdictKind.UNKNOWN)
@@ -286,7 +287,7 @@ class CriticismSummary(Section):
 
     @classmethod
     def of(
-        cls, inputs: "Inputs", sources: Sources, clean: int, tree: "DataTree", seconds: float
+        cls, inputs: "Inputs", sources: "Sources", clean: int, tree: "DataTree", seconds: float
     ) -> Self:
         """From what was given and found.
 
@@ -297,7 +298,8 @@ class CriticismSummary(Section):
             tree: criticism.nc.
             seconds: Time that it took [s].
         """
-        posterior, given = tree["posterior"].to_dataset(), sources.given
+        posterior, given = tree["posterior"].to_dataset(), sources.values()
+        parameters = {str(name): ParameterSummary.of(of) for name, of in posterior.items()}
         verdicts = list(map(SourceVerdict.of, given))
         verdict, effects = _together(verdicts)
         accepted, requested = (tuple(tree.attrs[name]) for name in ("accepted", "requested"))
@@ -311,14 +313,14 @@ class CriticismSummary(Section):
             held_out=min(one.held_out for one in verdicts if one.verdict == verdict),
             reason=" ".join(source.verdict.reason for source in given),
             p_value=min(1.0, len(verdicts) * min(one.p_value for one in verdicts)),
-            where=significant_windows(sources.stirs),
-            coefficient={name: ParameterSummary.of(posterior[name]) for name in accepted},
-            parameters={str(name): ParameterSummary.of(of) for name, of in posterior.items()},
+            where=significant_windows(sources["stirs"]),
+            coefficient={name: parameters[name] for name in accepted},
+            parameters=parameters,
             best=best_of(sources),
             n_simulations=clean + sum(source.simulations for source in given),
-            gap=GapSummary.of(sources.stirs),
+            gap=GapSummary.of(sources["stirs"]),
             stirs=verdicts[0],
-            pours=sources.pours and PourVerdict.of(sources.pours),
+            pours=PourVerdict.of(sources["pours"]) if "pours" in sources else None,
             suggestions=tuple(
                 SuggestedExperiment(one.label, tuple(one.between), one.snr)
                 for source in given
@@ -347,12 +349,12 @@ class CriticismSummary(Section):
         return tuple(self.made_from["settings"]["effects"] or ())
 
 
-def unsupported(sources: Sources) -> tuple[str, ...]:
+def unsupported(sources: "Sources") -> tuple[str, ...]:
     """Accepted effects that do not explain the difference: the test rejects them, or held-out data
     do."""
     return tuple(
         name
-        for source in sources.given
+        for source in sources.values()
         if source.leading is not None and not source.leading.accepted
         for name in source.accepted
     )

@@ -9,7 +9,7 @@ import xarray as xr
 
 from bolfi_liquids.calibration.model_error import Clean, regime_distance, usual_for
 from bolfi_liquids.calibration.stirs import camera_noise, held_out_noise, stir_experiment
-from bolfi_liquids.criticism.inputs import check_effects, open_inputs
+from bolfi_liquids.criticism.inputs import open_inputs
 from bolfi_liquids.errors import Argument, InputError
 from bolfi_liquids.inputs.cups import open_cups
 from bolfi_liquids.inputs.open import open_recordings
@@ -23,7 +23,6 @@ AT_REST, RHO, SD = 16, 0.6, np.radians(0.2)
 
 def given(calibration, settings=None, **some):
     settings, unopened = settings or CriticismSettings(), {"held_out": (), "baseline": ()} | some
-    check_effects(settings)
     opened = {
         name: open_recordings(paths, Argument(name)) if name in ("held_out", "baseline") else paths
         for name, paths in unopened.items()

@@ -9,13 +9,12 @@ from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 
 from bolfi_liquids.criticism import criticism_file
 from bolfi_liquids.criticism.criticism_file import (
-    Sources,
     _effects,
     _posterior,
     best_of,
     criticism_tree,
 )
-from bolfi_liquids.criticism.pour_noise import REPEATABILITY_SD, SIMULATOR_ERROR_SD, PourNoise
+from bolfi_liquids.criticism.pours import REPEATABILITY_SD, SIMULATOR_ERROR_SD, PourNoise
 from bolfi_liquids.criticism.summary import unsupported
 from bolfi_liquids.inputs.settings import CriticismSettings
 
@@ -32,6 +31,10 @@ def model(names, value):
     return SimpleNamespace(names=names, fit=fit, best=dict.fromkeys(parameters, value))
 
 
+def found_in(stirs, pours=None):
+    return {"stirs": stirs} if pours is None else {"stirs": stirs, "pours": pours}
+
+
 def source(accepted, extended):
     base = SimpleNamespace(hypothesis=model((), 0.0))
     concluded = {"accepted": accepted, "extended": extended, "base": base}
@@ -41,13 +44,14 @@ def source(accepted, extended):
 @pytest.fixture
 def attributes(monkeypatch):
     """(stirs, pours, accept) -> attributes of criticism.nc, whose tables stay empty."""
-    for table in ("_stirs_residual", "_pours_residual", "_where", "_effects", "_confusion"):
+    for table in ("_residual", "_where", "_effects", "_confusion"):
         monkeypatch.setattr(criticism_file, table, lambda *_: xr.Dataset())
 
     def attributes(stirs, pours, accept=None):
         settings = CriticismSettings(accept=accept)
-        inputs = SimpleNamespace(settings=settings, density=1000.0, stirring=None, table=pours)
-        return criticism_tree(inputs, Sources(stirs, pours)).attrs
+        stirring = SimpleNamespace(time=np.zeros(1), member=np.zeros(1, int))
+        inputs = SimpleNamespace(settings=settings, density=1000.0, stirring=stirring, table=None)
+        return criticism_tree(inputs, found_in(stirs, pours)).attrs
 
     return attributes
 
@@ -79,7 +83,7 @@ NOTHING = source((), None)
 def test_the_last_model_says_what_it_knows_and_the_stirs_the_rest(
     attributes, stirs, pours, expected
 ):
-    together = Sources(stirs, pours)
+    together = found_in(stirs, pours)
     assert best_of(together) == expected
     posterior = _posterior(together, 0)
     assert {name: float(values.mean()) for name, values in posterior.items()} == expected
@@ -96,7 +100,7 @@ def test_what_was_requested_is_told_from_what_was_found(attributes):
 def test_what_is_accepted_though_it_explains_nothing_is_told(explains, expected):
     stirs = source(("camera_delay",), model(("camera_delay",), 1.0))
     stirs.leading = SimpleNamespace(accepted=explains)
-    assert unsupported(Sources(stirs)) == expected
+    assert unsupported(found_in(stirs)) == expected
 
 
 def candidate(name, **changes):

@@ -9,7 +9,6 @@ import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.summary import bad_fit
-from bolfi_liquids.criticism.criticise import _learned_from
 from bolfi_liquids.criticism.result import calibration_to_pour
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.errors import InputError
@@ -84,9 +83,9 @@ def test_plots_of_the_base_model_are_refused(extended, criticised):
 
 
 def test_it_can_be_criticised(extended, calibration):
-    theta, signals, seeds = _learned_from(extended)
+    theta, signals, seeds = extended.learned_from
     assert set(theta) == {"viscosity", "cohesion"}
-    np.testing.assert_array_equal(seeds, _learned_from(calibration)[2])
+    np.testing.assert_array_equal(seeds, calibration.learned_from[2])
     assert len(signals) == len(seeds)
 
 
