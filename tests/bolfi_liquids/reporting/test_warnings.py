@@ -9,7 +9,7 @@ import xarray as xr
 from bolfi_liquids.inference.criticism.verdict_kind import VerdictKind
 
 import bolfi_liquids as bl
-from bolfi_liquids.calibration.figures import _rms_by
+from bolfi_liquids.calibration.figures import rms_by
 from bolfi_liquids.calibration.summary import FitStatus, bad_fit
 from bolfi_liquids.criticism.summary import PourVerdict
 from bolfi_liquids.inputs.cups import bundled_cups
@@ -242,6 +242,6 @@ def test_the_residual_of_a_stroke_is_its_own():
     numbers = np.repeat([0, 1, 4], 5)
     values = np.where(numbers == 1, 3.0, 0.0)
     values[2] = np.nan
-    assert _rms_by(numbers, values).tolist() == [0.0, 3.0, 0.0]
+    assert rms_by(numbers, values).tolist() == [0.0, 3.0, 0.0]
     values[numbers == 4] = np.nan
-    assert np.isnan(_rms_by(numbers, values)[2])
+    assert np.isnan(rms_by(numbers, values)[2])
