@@ -131,8 +131,8 @@ def _faults(
         )
     if recording.hash in known:
         yield (
-            "is what is calibrated on",
-            "give another recording: one that is fitted proves nothing",
+            "is what the run is calibrated on",
+            "give another recording: nothing can be proved on data that are fitted",
         )
     for name in RIG_SIZES:
         there, here = recording.number(name), first.number(name)

@@ -15,7 +15,7 @@ from ..inputs.frame import named_faults
 from ..models import stirring_error
 from ..run.summary import Number, Section
 from ..simulators import StirSimulator
-from ..wording import with_unit
+from ..wording import degrees, with_unit
 from .stirs import irreducible_rms, rms
 
 if TYPE_CHECKING:
@@ -259,12 +259,14 @@ def bad_fit(summary: CalibrationSummary) -> str | None:
         return None
     if summary.frame_faults:
         return f"{'; '.join(summary.frame_faults)}. Do not rely on the posterior."
+    misfit, error, noise = map(
+        degrees, (summary.fit_rms_deg, summary.simulator_error_deg, summary.noise_deg)
+    )
     return (
-        f"The fit is bad: {summary.fit_rms_deg:.2f}° RMS, of which the simulator's own error is "
-        f"about {summary.simulator_error_deg:.2f}°; the rest is {summary.fit_to_noise:.1f} times "
-        f"the noise of {summary.noise_deg:.2f}°. A sign, the direction of the axes, the clock, a "
-        "size or a density is likely wrong, too little was simulated, or the simulator lacks an "
-        "effect. Do not rely on the posterior."
+        f"The fit is bad: {misfit} RMS, of which the simulator's own error is about {error}; the "
+        f"rest is {summary.fit_to_noise:.1f} times the noise of {noise}. A sign, the direction of "
+        "the axes, the clock, a size or a density is likely wrong, too little was simulated, or "
+        "the simulator lacks an effect. Do not rely on the posterior."
     )
 
 

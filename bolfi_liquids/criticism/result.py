@@ -11,6 +11,7 @@ from ..drawing import shown
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..run.run import Run, RunOrPath
 from ..wording import html_table, spoken
+from . import figures
 from .summary import CriticismSummary
 
 if TYPE_CHECKING:
@@ -116,29 +117,21 @@ class Criticism:
 
     def plot_residuals(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Observed less expected against time, before and after, strokes that differ marked."""
-        from .figures import residual_plot
-
-        return shown(partial(residual_plot, self.tree.children["stirs"]), axes)
+        return shown(partial(figures.residual_plot, self._of("stirs")), axes)
 
     def plot_strokes(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Size of the difference by stroke, plane and speed, before and after."""
-        from .figures import stroke_plot
-
-        return shown(partial(stroke_plot, self.tree.children["stirs"]), axes)
+        return shown(partial(figures.stroke_plot, self._of("stirs")), axes)
 
     def plot_scores(self, source: str = "stirs", axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """How well each effect alone would explain the difference."""
-        from .figures import score_plot
-
-        return shown(partial(score_plot, self.tree.children[source]), axes)
+        return shown(partial(figures.score_plot, self._of(source)), axes)
 
     def plot_confusion(
         self, source: str = "stirs", axes: "ArrayLike | None" = None
     ) -> "NDArray[Any]":
         """Which effects these data cannot distinguish: cosines between their signatures."""
-        from .figures import confusion_plot
-
-        return shown(partial(confusion_plot, self.tree.children[source]), axes)
+        return shown(partial(figures.confusion_plot, self._of(source)), axes)
 
     def plot_coefficient(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Posterior of the accepted effects' coefficients.
@@ -146,11 +139,9 @@ class Criticism:
         Raises:
             ValueError: no effect was accepted.
         """
-        from .figures import coefficient_plot
-
         if not self.summary.accepted:
             raise ValueError("no effect was accepted, so there is no coefficient to plot")
-        return shown(partial(coefficient_plot, self.tree, self.summary.accepted), axes)
+        return shown(partial(figures.coefficient_plot, self.tree, self.summary.accepted), axes)
 
     def plot_held_out(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """RMS on recordings that were not fitted, before and after.
@@ -158,13 +149,7 @@ class Criticism:
         Raises:
             ValueError: nothing was tried on such recordings.
         """
-        from .figures import held_out_plot
-
-        if "held_out" not in self.tree["stirs"].children:
-            raise ValueError(
-                "no explanation was tested on held-out recordings; criticise the run with held_out"
-            )
-        return shown(partial(held_out_plot, self.tree.children["stirs"]), axes)
+        return shown(partial(figures.held_out_plot, self._of("stirs", "held_out")), axes)
 
     def plot_pours(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Observed against expected fractions of each pour, before and after.
@@ -172,11 +157,18 @@ class Criticism:
         Raises:
             ValueError: no pours were criticised.
         """
-        from .figures import pour_residual_plot
+        return shown(partial(figures.pour_residual_plot, self._of("pours")), axes)
 
-        if "pours" not in self.tree.children:
-            raise ValueError("no pours were criticised; criticise the run with pours")
-        return shown(partial(pour_residual_plot, self.tree.children["pours"]), axes)
+    def _of(self, source: str, group: str = "effects") -> "DataTree":
+        """The groups of "stirs" or "pours".
+
+        Raises:
+            ValueError: It was not criticised, or has no such group.
+        """
+        if f"/{source}/{group}" not in self.tree.groups:
+            option = group if group == "held_out" else source
+            raise ValueError(f"nothing was found on {option}; criticise the run with {option}")
+        return self.tree.children[source]
 
 
 def calibration_to_pour(run: Run) -> Calibration:

@@ -147,7 +147,7 @@ class GapSummary:
         noise = rms(np.sqrt(np.diag(base.own) + np.diag(source.measurement)))
         known = float(np.hypot(noise, source.usual))
         before, after = _rms(base), None if best is None else _rms(best.hypothesis)
-        numbers = {
+        numbers: dict[str, Any] = {
             "before": beyond(before, known),
             "after": None if after is None else beyond(after, known),
             "noise": noise,
@@ -155,22 +155,15 @@ class GapSummary:
             "rms_before": before,
             "rms_after": after,
         }
-        held_out = {
-            "before": [gap.unexplained[0] for gap in gaps],
-            "after": [gap.unexplained[1] for gap in gaps],
-            "noise": [gap.noise for gap in gaps],
-            "usual": [gap.usual for gap in gaps],
-            "rms_before": [gap.before for gap in gaps],
-            "rms_after": [gap.after for gap in gaps],
-        }
+        held_out = [(*gap.unexplained, gap.noise, gap.usual, gap.before, gap.after) for gap in gaps]
+        columns = np.transpose(held_out) if held_out else [None] * len(numbers)
         numbers |= {
-            f"held_out_{name}": rms(np.array(of)) if of else None for name, of in held_out.items()
+            f"held_out_{name}": None if of is None else rms(of)
+            for name, of in zip(list(numbers), columns, strict=True)
         }
-        in_degrees: dict[str, Any] = {
-            name: None if value is None else float(np.degrees(value))
-            for name, value in numbers.items()
-        }
-        return cls(**in_degrees)
+        return cls(
+            **{name: None if of is None else float(np.degrees(of)) for name, of in numbers.items()}
+        )
 
 
 def significant_windows(source: "inference.criticism.Criticism") -> tuple[DifferingWindow, ...]:

@@ -24,7 +24,6 @@ from ..files import write_text
 from ..pouring.figures import pour_figure
 from ..run.compute import open_compute
 from ..run.run import REPORT, RUN_TOML, Run, RunOrPath
-from .facts import held_out_of
 from .films import Film, films_of
 from .prose import prose, templates
 from .warnings import Results
@@ -116,7 +115,7 @@ def _criticism_figures(criticism: Criticism) -> dict[str, "Figure"]:
     drawn = {"residual": residual_plot(stirs), "strokes": stroke_plot(stirs)}
     if accepted:
         drawn["coefficient"] = coefficient_plot(tree, accepted)
-    if held_out_of(stirs) is not None:
+    if "held_out" in stirs.children:
         drawn["held-out"] = held_out_plot(stirs)
     if "pours" in sources:
         drawn["pours"] = pour_residual_plot(sources["pours"])

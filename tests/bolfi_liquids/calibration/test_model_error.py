@@ -98,7 +98,7 @@ def same(dataset):
         (rerated, "signal", "samples a second"),
         (widened, "signal", "cup_radius"),
         (hasty, "signal", "before the gripper moves"),
-        (same, "signal", "what is calibrated on"),
+        (same, "signal", "what the run is calibrated on"),
         (lambda dataset: dataset, "discrepancy", "does not allow for an error"),
     ],
 )

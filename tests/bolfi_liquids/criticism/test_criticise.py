@@ -94,7 +94,7 @@ def test_what_is_held_out_or_clean_in_a_wrong_frame_is_told(calibration, caplog)
 
 def test_data_that_were_fitted_prove_nothing(calibration):
     (kept,) = calibration.run.recordings
-    with pytest.raises(InputError, match="is what is calibrated on"):
+    with pytest.raises(InputError, match="is what the run is calibrated on"):
         bl.criticise(calibration, held_out=kept, progress=False)
 
 
