@@ -13,7 +13,6 @@ import numpyro.distributions as dist
 import pytest
 import xarray as xr
 from arviz_stats.base.array import array_stats
-from bolfi_liquids.inference.simulations import job
 
 import bolfi_liquids as bl
 from bolfi_liquids import inference, models
@@ -23,7 +22,7 @@ from bolfi_liquids.calibration.figures import grid_density, marginal
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.simulators import StirSimulator, stir_simulator
+from bolfi_liquids.simulators import stir_simulator
 
 SHORT = 60  # samples of `short_recording`
 
@@ -145,7 +144,6 @@ UNIT = dist.Uniform(0.1, 1.0)
         ({"baseline": first(0, None), "surrogate": "discrepancy"}, "baseline"),
         (prior_of(viscosity=UNIT, cohesin=UNIT), "cohesin"),
         (prior_of(viscosity=Mine(0.1, 1.0), cohesion=UNIT), "viscosity"),
-        ({"budget": 3}, "budget"),
     ],
 )
 def test_what_cannot_be_used_is_refused_by_its_name_before_anything_is_written(
@@ -166,12 +164,17 @@ def test_default_prior_covers_water_to_gel():
     np.testing.assert_array_equal(default_prior().contains(theta), [False, True, True, False])
 
 
-def test_it_prints_its_quantiles_and_whether_the_sampler_converged(calibration):
+def test_it_prints_its_quantiles_and_opens_as_it_was_made(calibration, short_recording, settings):
     said = repr(calibration)
     assert str(calibration.path) in said and str(calibration.summary.sampler_status) in said
     for name, values in calibration.summary.parameters.items():
         assert name in said and f"{values.q50:.3g}" in said
         assert f"{values.q95:.3g}" in calibration._repr_html_()
+    given = {name: np.int64(value) for name, value in settings.items()}
+    again = bl.calibrate(
+        short_recording, out=calibration.path, resume=True, progress=False, **given
+    )
+    assert again.summary == calibration.summary
 
 
 @pytest.mark.parametrize(
@@ -214,46 +217,6 @@ def test_a_run_begins_in_a_temporary_directory_and_says_that_a_recording_was_abo
     assert str(aborted) in notice.getMessage() and "protective stop" in notice.getMessage()
     assert str(found[0]).startswith(tempfile.gettempdir()) and (found[0] / "run.toml").is_file()
     shutil.rmtree(found[0])
-
-
-def test_settings_may_be_integers_of_numpy(short_recording, calibration, settings):
-    """They are those of the run, which is only opened."""
-    given = {name: np.int64(value) for name, value in settings.items()}
-    again = bl.calibrate(
-        short_recording, out=calibration.path, resume=True, progress=False, **given
-    )
-    assert again.summary == calibration.summary
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::bolfi_liquids.inference.surrogates.warnings.EmulatorWarning")
-def test_stirs_that_take_too_long_are_counted_and_their_limit_is_kept(
-    short_recording, settings, tmp_path, monkeypatch, caplog
-):
-    simulate, calls = StirSimulator.simulate, []
-
-    def slow(self, theta, seeds):
-        calls.append(seeds)
-        if len(calls) in (1, 2):  # the first batch together, then its first alone
-            raise models.TimeLimitExceeded
-        return simulate(self, theta, seeds)
-
-    monkeypatch.setattr(StirSimulator, "simulate", slow)
-    monkeypatch.setattr(job, "within", given_up)
-    made = bl.calibrate(
-        short_recording, out=tmp_path / "run", timeout=600.0, progress=False, **settings
-    )
-    notices = [one.args for one in caplog.records if one.name.endswith("run.simulations")]
-    learned = made.tree["simulations"].sizes["simulation"]
-    assert notices == [(1, learned, 600.0)]
-
-
-def given_up(timeout, call, limit=None):
-    """As if the time were over where the simulator says so."""
-    try:
-        return call()
-    except TimeoutError as error:
-        raise job.Overdue from error
 
 
 @pytest.mark.slow

@@ -5,15 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from bolfi_liquids.inference.criticism import Gap
 
 from bolfi_liquids.criticism import criticism_file
 from bolfi_liquids.criticism.criticism_file import (
     _effects,
     _posterior,
+    _residual,
     best_of,
     criticism_tree,
 )
-from bolfi_liquids.criticism.summary import unsupported
+from bolfi_liquids.criticism.summary import GapSummary, unsupported
 from bolfi_liquids.inputs.settings import CriticismSettings
 
 
@@ -138,3 +140,40 @@ def test_each_effect_has_one_row_that_says_what_became_of_it():
         "adhesion": "untested: its simulations failed",
     }
     assert table.sizes["effect"] == len(names)
+
+
+def hypothesis(difference):
+    """Of four data, of which it leaves the difference [rad]."""
+    output = SimpleNamespace(restore=lambda rows: rows.reshape(-1, 2, 2))
+    return SimpleNamespace(
+        difference=np.array(difference),
+        own=3.0 * np.eye(4),
+        spread=5.0 * np.eye(4),
+        noise=4.0 * np.eye(4),
+        surrogate=SimpleNamespace(output=output),
+        names=("camera_delay",),
+    )
+
+
+def test_gaps_and_residuals_are_observed_less_expected():
+    before, after = hypothesis([5.0, -5.0, 5.0, -5.0]), hypothesis([3.0, -3.0, 3.0, -3.0])
+    gap = Gap("third", before=10.0, after=6.0, noise=3.0, usual=4.0, floor=0, p_value=1, lpd_gain=0)
+    found = SimpleNamespace(
+        leading=SimpleNamespace(hypothesis=after, names=after.names),
+        base=SimpleNamespace(hypothesis=before),
+        extended=after,
+        gaps={after.names: (gap, gap)},
+        measurement=6.0 * np.eye(4),
+        usual=4.0,
+        observed=np.zeros((2, 2)),
+    )
+    summary = {name: np.radians(of) for name, of in vars(GapSummary.of(found)).items()}
+    expected = {"noise": 3.0, "usual": 4.0, "rms_before": 5.0, "rms_after": 3.0}
+    expected |= {"before": 0.0, "after": 0.0}
+    expected |= {"held_out_noise": 3.0, "held_out_usual": 4.0}
+    expected |= {"held_out_rms_before": 10.0, "held_out_rms_after": 6.0}
+    expected |= {"held_out_before": np.sqrt(75.0), "held_out_after": np.sqrt(11.0)}
+    assert summary == pytest.approx(expected, abs=1e-9)
+    residual = _residual(found, ("frame", "plane"), {"units": "rad"})
+    assert residual["expected_after"].to_numpy().tolist() == [[-3.0, 3.0], [-3.0, 3.0]]
+    assert (residual["sd_before"] == 3.0).all() and residual["observed"].attrs["units"] == "rad"

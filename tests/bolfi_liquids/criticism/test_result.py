@@ -3,6 +3,7 @@
 import json
 import pickle
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -67,6 +68,14 @@ def test_an_effect_of_pours_alone_mends_no_stir(criticised, with_numbers):
     tied = stirs | {"verdict": "tie", "effects": ["stick_mass", "camera_tilt"]}
     with_numbers(criticised, "criticise", stirs=tied)
     assert bad_fit(calibration_to_pour(Run.open(criticised)).summary) is not None
+
+
+def test_an_accepted_turn_of_the_cameras_mends_a_turned_frame(calibration):
+    turned = replace(calibration.summary, frame_faults=("stir.nc: turned by 45 deg",))
+    posterior = calibration.posterior
+    rotation = {"camera_rotation": posterior["cohesion"]}
+    assert turned.extended(posterior).frame_faults
+    assert not turned.extended(posterior.assign(rotation)).frame_faults
 
 
 def test_plots_of_the_base_model_are_refused_and_its_search_is_the_bases(extended, criticised):

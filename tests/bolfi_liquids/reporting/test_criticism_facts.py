@@ -54,53 +54,45 @@ def said(criticise):
     return of
 
 
-@pytest.mark.parametrize(
-    ("changes", "words", "others"),
-    [
-        ({}, ["differ", "0.002", "camera delay"], ["may be"]),
-        ({"held_out": 0}, ["differ", "may be camera delay"], []),
-        (TIED, ["camera delay or gripper scale", "cannot distinguish"], []),
-        (UNKNOWN, ["differ", "No known effect"], ["camera delay"]),
-        (REFUTED, ["Camera delay", "contradict"], ["No known effect"]),
-        (AGREES, ["agree", "0.4"], ["differ"]),
-    ],
-)
-def test_each_verdict_is_said(said, changes, words, others):
-    (paragraph,) = said("verdict", **changes)
-    assert all(word in paragraph for word in words)
-    assert not any(word in paragraph for word in others)
-
-
 ASKED = AGREES | {"accepted": ("stick_mass",), "requested": ("stick_mass",), "parameters": LIQUID}
 FEW = {"made_from": {"settings": {"effects": ["camera_delay", "stick_mass"]}}}
 OWN = {"my_effect": ParameterSummary(mean=2.0, sd=0.1, q05=1.8, q50=2.0, q95=2.2)}
 
 
-@pytest.mark.parametrize(
-    ("part", "changes", "words"),
-    [
-        ("criticism", {}, ["0.04 s and 0.06 s", "0 s there is no effect", "instead of 1 Pa s"]),
-        ("criticism", {"coefficient": OWN}, ["between 1.8 and 2.2"]),
-        ("criticism", FEW, ["camera delay and stick mass", "--effects"]),
-        ("criticism", ASKED, ["Stick mass", "--accept", "whatever"]),
-        ("criticism", ASKED | {"unsupported": ("stick_mass",)}, ["not support stick mass"]),
-        ("gap", {}, ["1.25°", "0.31°", "1.50°", "0.42°", "0.33°", "0.20°"]),
-        ("noise", {}, ["0.20°", "32 samples", "40 %"]),
-        ("baseline", {}, ["2 clean"]),
-        ("baseline", {"baseline": 0}, ["--baseline"]),
-        ("baseline", {"baseline_left_out": ("stir.nc",)}, ["2 clean", "stir.nc"]),
-        ("where", {}, ["stroke 1, xz plane, 1.0 to 2.0 s (1-first.nc): 2.50°", "at 0 to 3 cm/s"]),
-        ("where", {"where": ()}, ["No single"]),
-        ("detectable", {}, ["camera delay (14), gripper scale (4)"]),
-        ("undetectable", {"untested": ("gripper_scale",)}, ["stick mass", "Untested: gripper"]),
-        ("next", TIED, ["record the star", "5.5"]),
-        ("next", TIED | {"suggestions": (CIRCLES,)}, ["None", "four circles", "1.0"]),
-    ],
-)
-def test_each_part_says_its_facts(said, part, changes, words):
-    whole = " ".join(said(part, **changes))
-    assert all(word in whole for word in words)
-    assert "my effect there is" not in whole  # which this process does not know
+PARTS = [
+    # part, numbers of the criticism, what is said, what is not
+    ("verdict", {}, ["differ", "0.002", "camera delay"], ["may be"]),
+    ("verdict", {"held_out": 0}, ["differ", "may be camera delay"], []),
+    ("verdict", TIED, ["camera delay or gripper scale", "cannot distinguish"], []),
+    ("verdict", UNKNOWN, ["differ", "No known effect"], ["camera delay"]),
+    ("verdict", REFUTED, ["Camera delay", "contradict"], ["No known effect"]),
+    ("verdict", AGREES, ["agree", "0.4"], ["differ"]),
+    ("criticism", {}, ["0.04 s and 0.06 s", "0 s there is no effect", "instead of 1 Pa s"], []),
+    ("criticism", {"coefficient": OWN}, ["between 1.8 and 2.2"], ["there is no effect"]),
+    ("criticism", FEW, ["camera delay and stick mass", "--effects"], []),
+    ("criticism", ASKED, ["Stick mass", "--accept", "whatever"], ["not support"]),
+    ("criticism", ASKED | {"unsupported": ("stick_mass",)}, ["not support stick mass"], []),
+    ("gap", {}, ["1.25°", "0.31°", "1.50°", "0.42°", "0.33°", "0.20°"], []),
+    ("noise", {}, ["0.20°", "32 samples", "40 %"], []),
+    ("baseline", {"baseline": 0}, ["--baseline"], []),
+    ("baseline", {"baseline_left_out": ("stir.nc",)}, ["2 clean", "stir.nc"], ["--baseline"]),
+    ("where", {}, ["stroke 1, xz plane, 1.0 to 2.0 s (1-first.nc): 2.50°", "at 0 to 3 cm/s"], []),
+    ("where", {"where": ()}, ["No single"], []),
+    ("detectable", {}, ["camera delay (14), gripper scale (4)"], ["stick mass"]),
+    ("undetectable", {"untested": ("gripper_scale",)}, ["stick mass", "Untested: gripper"], []),
+    ("next", TIED, ["record the star", "5.5"], []),
+    ("next", TIED | {"suggestions": (CIRCLES,)}, ["None", "four circles", "1.0"], ["record"]),
+]
+
+
+def test_each_part_says_its_facts_and_no_others(said):
+    wrong = []
+    for part, changes, words, others in PARTS:
+        whole = " ".join(said(part, **changes))
+        missing = [word for word in words if word not in whole]
+        if missing or any(other in whole for other in others):
+            wrong.append((part, changes, missing, whole))
+    assert not wrong
 
 
 def test_tables_hold_each_number_in_its_unit(criticise):
@@ -184,7 +176,7 @@ def test_the_command_line_says_what_the_report_says_and_fits_a_terminal(printed,
         assert all(paragraph in text for paragraph in said(part)), part
 
 
-@pytest.mark.parametrize(("changes", "told"), [(TIED, True), (REFUTED, True), ({}, False)])
+@pytest.mark.parametrize(("changes", "told"), [(REFUTED, True), ({}, False)])
 def test_effects_that_gain_are_named_where_nothing_else_is(said, made, changes, told):
     *_, last = said("detectable", made(status=["rejected: explains nothing"] * 3), **changes)
     assert ("camera delay (gain 286.0" in last and "stick mass (gain 4.0" in last) == told

@@ -3,7 +3,7 @@
 import html
 import re
 import shutil
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from html.parser import HTMLParser
 from multiprocessing import get_context
@@ -17,9 +17,8 @@ import bolfi_liquids as bl
 from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.cli.printed import print_pour
-from bolfi_liquids.reporting import films as making
 from bolfi_liquids.reporting.facts import calibration_facts, criticism_facts, fit_facts, pour_facts
-from bolfi_liquids.reporting.films import films_of
+from bolfi_liquids.reporting.films import N_DRAWS_SHOWN, films_of
 from bolfi_liquids.reporting.prose import prose
 from bolfi_liquids.run.result_file import _parsed
 from bolfi_liquids.run.run import Run
@@ -101,18 +100,22 @@ def unseen(pour, tmp_path):
     return run
 
 
-def test_a_report_says_where_its_pictures_are_simulated(unseen, monkeypatch):
-    seen = []
+class Recorded(ThreadPoolExecutor):
+    """Notes what it is to make, and takes too long."""
 
-    def made(films, compute):
-        seen.append((compute.executor, compute.timeout))
+    asked = ()
+
+    def map(self, made, films):
+        self.asked = [made.keywords, list(films)]
         raise TimeoutError
 
-    monkeypatch.setattr(making, "_made", made)
-    spawn = get_context("spawn")
-    with ProcessPoolExecutor(1, spawn) as pool, pytest.raises(RuntimeError, match="60 s"):
-        bl.report(unseen, executor=pool, timeout=60.0, progress=False)
-    assert seen == [(pool, 60.0)]
+
+def test_films_are_simulated_by_the_executor_within_the_limit(unseen):
+    results = bl.Calibration.open(unseen), bl.Pour.open(unseen)
+    with Recorded(1) as pool, pytest.raises(RuntimeError, match="60 s"):
+        films_of(*results, Compute(pool, 60.0), progress=False)
+    (limits, films) = pool.asked
+    assert limits == {"timeout": 60.0} and len(films) == 2 * N_DRAWS_SHOWN
 
 
 def test_no_result_is_opened_twice(pour, films, monkeypatch):
