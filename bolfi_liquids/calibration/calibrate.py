@@ -34,7 +34,6 @@ from ..simulators import StirSimulator, stir_simulator
 from .engine_fit import (
     PREDICTIVE_DRAWS,
     THETA_STAR_REPLICATES,
-    check_of,
     confirmed,
     fit_recordings,
     results_tree,
@@ -222,8 +221,7 @@ def _calibrate(
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )
-        check = check_of(fit, stirring, settings.seed, compute, advance=advance)
-    tree = results_tree(sampled, fit, stirring, check)
+        tree = results_tree(sampled, fit, stirring, settings.seed, compute, advance)
     names = tuple(one.path.name for one in clean)
     summary = CalibrationSummary.from_fit(tree, fit, stirring, settings.budget, error, names)
     run.keep("calibrate", tree, run.made_from, summary.to_json())

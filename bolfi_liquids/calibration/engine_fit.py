@@ -13,7 +13,7 @@ Groups of posterior.nc from the engine, in ArviZ's schema: `posterior`, `sample_
 """
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,33 +146,14 @@ def confirmed(
     )
 
 
-class PosteriorCheck(NamedTuple):
-    """Signals of the simulations that judge a calibration.
+def closest_drawn(fit: "Fit", stirring: StirSimulator) -> "tuple[Closest, NDArray[np.int64]]":
+    """The run at a posterior draw that comes closest, and all of them that succeeded, as rows (n,).
 
-    `closest` of them judges the fit, not the closest of the search: among few of these none may be
-    near, though the posterior is right.
-    """
-
-    closest: "Closest"  # of those at posterior draws
-    predictive: NDArray[np.float64]  # (draws, T, planes) rad, at draws, half where it is wide
-    replicates: NDArray[np.float64]  # (seeds, T, planes) rad, all at theta*
-    seconds: float  # spent in the simulator at theta* [s]
-
-
-def check_of(
-    fit: "Fit", stirring: StirSimulator, seed: int, compute: "Compute", *, advance: Advance = silent
-) -> PosteriorCheck:
-    """Collect the runs at draws of a posterior, and simulate theta*.
-
-    Args:
-        fit: Of the engine, with runs that confirm it or not.
-        stirring: The simulator, and what was recorded.
-        seed: Of the run.
-        compute: Where simulations are made and kept.
-        advance: Called with 1 for each simulation.
+    It judges the fit, not the closest run of the search: among few of these none may be near,
+    though the posterior is right.
 
     Raises:
-        RuntimeError: Every simulation at a posterior draw failed, or every one at theta*.
+        RuntimeError: Every simulation at a posterior draw failed.
     """
     from ..inference.result import Closest
 
@@ -187,24 +168,37 @@ def check_of(
     discrepancies = [distance(stirring.observed, history.signal(run)) for run in good]
     nearest = int(np.argmin(discrepancies))
     theta = fit.prior.to_dict(history.theta[good[nearest]])
-    closest = {name: float(value) for name, value in theta.items()}
-    at_best = {name: np.full(THETA_STAR_REPLICATES, value) for name, value in fit.best.items()}
-    seeds = simulation_seeds(seed, Phase.REPLICATES, THETA_STAR_REPLICATES)
-    replicates = simulate_kept(stirring, at_best, seeds, compute, advance=advance)
-    return PosteriorCheck(
-        Closest(closest, history.signal(good[nearest]), discrepancies[nearest]),
-        history.signals[good],
-        replicates.signals,
-        replicates.seconds,
-    )
+    named = {name: float(value) for name, value in theta.items()}
+    return Closest(named, history.signal(good[nearest]), discrepancies[nearest]), good
 
 
 def results_tree(
-    sampled: "DataTree", fit: "Fit", stirring: StirSimulator, check: PosteriorCheck
+    sampled: "DataTree",
+    fit: "Fit",
+    stirring: StirSimulator,
+    seed: int,
+    compute: "Compute",
+    advance: Advance = silent,
 ) -> "DataTree":
-    """The engine's tree with the groups that are added here."""
+    """The engine's tree with the groups that are added here; simulates the replicates.
+
+    Args:
+        sampled: Of the engine.
+        fit: That was sampled, with runs that confirm it or not.
+        stirring: The simulator, and what was recorded.
+        seed: Of the run.
+        compute: Where simulations are made and kept.
+        advance: Called with 1 for each simulation.
+
+    Raises:
+        RuntimeError: Every simulation at a posterior draw failed, or every one at theta*.
+    """
     from xarray import Dataset, DataTree
 
+    closest, good = closest_drawn(fit, stirring)
+    at_best = {name: np.full(THETA_STAR_REPLICATES, value) for name, value in fit.best.items()}
+    seeds = simulation_seeds(seed, Phase.REPLICATES, THETA_STAR_REPLICATES)
+    replicates = simulate_kept(stirring, at_best, seeds, compute, advance=advance)
     frames = {
         "time": ("frame", stirring.time, {"units": "s"}),
         "recording": ("frame", stirring.member),
@@ -217,17 +211,17 @@ def results_tree(
         return Dataset({"inclination": (dims, values, {"units": "rad"})}, coords=frames)
 
     tree = sampled.copy()
-    numbers = {"discrepancy": check.closest.discrepancy, **check.closest.theta}
+    numbers = {"discrepancy": closest.discrepancy, **closest.theta}
     added = {
         "recorded": inclination(stirring.observed),
-        "posterior_predictive": inclination(check.predictive[None], "chain", "draw"),
-        "replicates": inclination(check.replicates, "seed"),
-        "closest": inclination(check.closest.signal).assign(numbers),
+        "posterior_predictive": inclination(fit.history.signals[good][None], "chain", "draw"),
+        "replicates": inclination(replicates.signals, "seed"),
+        "closest": inclination(closest.signal).assign(numbers),
         "surface": _surface(fit),
     }
     for name, dataset in added.items():
         tree[name] = DataTree(dataset)
-    tree.attrs["seconds_simulator"] += check.seconds
+    tree.attrs["seconds_simulator"] += replicates.seconds
     tree.attrs["least_viscosity"] = stirring.least_viscosity
     tree.attrs["stick_radius_cells"] = [
         cells_in_radius(setup.stick.radius, setup.cell) for setup in stirring.setups

@@ -75,7 +75,6 @@ def residual_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
             panel.set_title(f"{plane} plane", loc="left")
             panel.set_xlabel("time [s]")
         row[0].set_ylabel("observed less expected [deg]")
-    _name_rows(drawn, node)
     add_legend(drawn, drawn.grid[0, 0])
     return drawn
 
@@ -90,22 +89,16 @@ def _models(part: "Dataset", what: str) -> dict[str, tuple[str, "DataArray"]]:
 
 
 def _rows(drawn: Panels, node: "DataTree") -> "Iterator[tuple[NDArray, Dataset, Dataset]]":
-    """The panels of each recording, its residual and its windows."""
+    """The panels of each recording, its residual and its windows; of several, each is named in the
+    title of its first panel."""
     residual, where = node["residual"].to_dataset(), node["where"].to_dataset()
     member, names = residual["recording"].to_numpy(), where["recording"].to_numpy()
     for row, one in zip(drawn.grid, np.unique(member), strict=True):
         # their files are numbered from 1
-        mine = [str(name).startswith(f"{one + 1}-") for name in names]
-        own = where.isel(window=np.flatnonzero(mine))
-        yield row, residual.isel(frame=np.flatnonzero(member == one)), own
-
-
-def _name_rows(drawn: Panels, node: "DataTree") -> None:
-    """Write the names of several recordings above their rows."""
-    rows = list(_rows(drawn, node))
-    for row, _, windows in rows if len(rows) > 1 else ():
-        name = next((str(name) for name in windows["recording"].to_numpy()), "")
-        row[0].set_title(f"{name}\n{row[0].get_title(loc='left')}", loc="left")
+        mine = np.flatnonzero([str(name).startswith(f"{one + 1}-") for name in names])
+        yield row, residual.isel(frame=np.flatnonzero(member == one)), where.isel(window=mine)
+        if len(drawn.grid) > 1 and mine.size:
+            row[0].set_title(f"{names[mine[0]]}\n{row[0].get_title(loc='left')}", loc="left")
 
 
 def _size(recordings: int) -> tuple[float, float]:
@@ -141,7 +134,6 @@ def stroke_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
         row[-1].set_title("both planes", loc="left")
         row[-1].set_xlabel("gripper's speed [cm/s]")
         row[0].set_ylabel("RMS [deg]")
-    _name_rows(drawn, node)
     add_legend(drawn, drawn.grid[0, 0])
     return drawn
 

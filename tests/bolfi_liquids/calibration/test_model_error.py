@@ -11,12 +11,10 @@ from bolfi_liquids.models import stirring_error
 
 import bolfi_liquids as bl
 from bolfi_liquids import inference
-from bolfi_liquids.calibration import engine_fit as checking
-from bolfi_liquids.calibration.engine_fit import check_of
+from bolfi_liquids.calibration.engine_fit import closest_drawn
 from bolfi_liquids.calibration.model_error import SHORT_PART, model_error
 from bolfi_liquids.reporting.facts import fit_facts
 from bolfi_liquids.reporting.prose import prose
-from bolfi_liquids.run.simulations import Kept
 from bolfi_liquids.simulators import stir_simulator
 from bolfi_liquids.wording import degrees
 
@@ -72,10 +70,8 @@ def straight(theta, seeds):
     return slopes * np.linspace(0.2, 1.0, 10)[:, None] * np.ones(2)
 
 
-def test_the_closest_run_at_posterior_draws_judges_a_fit(monkeypatch):
+def test_the_closest_run_at_posterior_draws_judges_a_fit():
     """Failed runs are left out; parameters stay with their signals."""
-    kept = Kept(np.zeros((4, 10, 2)), np.arange(4), 2.0)
-    monkeypatch.setattr(checking, "simulate_kept", lambda *_, **__: kept)
     prior = inference.Prior({"viscosity": dist.LogUniform(0.1, 10.0)})
     observed = straight({"viscosity": np.array([0.5])}, [0])[0]
     options = {"budget": 9, "confirm": 4, "noise": 0.1, "progress": False, "warn": False}
@@ -86,13 +82,11 @@ def test_the_closest_run_at_posterior_draws_judges_a_fit(monkeypatch):
     judged = replace(fit, history=fit.history._replace(discrepancy=discrepancy))
     stirring = SimpleNamespace(
         observed=observed,
-        simulate=None,
         discrepancy=lambda: lambda a, b: float(np.sum((a - b) ** 2)),
     )
-    found = check_of(judged, stirring, 0, None)
+    found, good = closest_drawn(judged, stirring)
     nearest = min(others, key=lambda run: abs(np.log(fit.history.theta[run, 0] / 0.5)))
-    assert found.closest.theta == {"viscosity": fit.history.theta[nearest, 0]}
-    np.testing.assert_array_equal(found.closest.signal, fit.history.signals[nearest])
-    np.testing.assert_array_equal(found.predictive, fit.history.signals[others])
-    off = np.sum((observed - found.closest.signal) ** 2)
-    assert found.closest.discrepancy == pytest.approx(off)
+    assert found.theta == {"viscosity": fit.history.theta[nearest, 0]}
+    np.testing.assert_array_equal(found.signal, fit.history.signals[nearest])
+    assert good.tolist() == others
+    assert found.discrepancy == pytest.approx(np.sum((observed - found.signal) ** 2))
