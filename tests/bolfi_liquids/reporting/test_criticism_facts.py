@@ -16,6 +16,7 @@ from bolfi_liquids.reporting.prose import prose
 from bolfi_liquids.reporting.report import figures_of
 from bolfi_liquids.reporting.warnings import Results
 
+SOURCES = ("stirs", "pours")
 EFFECTS = ("camera_delay", "gripper_scale", "stick_mass")
 CIRCLES = SuggestedExperiment("four circles", EFFECTS[:2], 1.0)
 STAR = SuggestedExperiment("the star", EFFECTS[:2], 5.5)
@@ -107,12 +108,18 @@ def test_tables_hold_each_number_in_its_unit(criticise):
     assert facts["noise"]["samples"] == 32 and facts["pours"] is None
 
 
-def test_figures_of_an_effect_that_was_named(criticise):
-    criticism = criticise()
+@pytest.mark.slow
+def test_a_page_has_a_figure_of_everything_that_was_found(criticise, made):
+    criticism = criticise(made(held=True, pours=True))
     drawn = figures_of(Results(criticism.base, criticism, None))
-    assert "camera delay [s]" in drawn["coefficient"]
-    assert "RMS of observed less expected [deg]" in drawn["held-out"]
-    assert "pours" not in drawn
+    of_sources = {f"{name}-{source}" for name in ("scores", "confusion") for source in SOURCES}
+    always = {"inclination", "by-stroke", "posterior", "search", "residual", "strokes"}
+    assert set(drawn) == always | of_sources | {"coefficient", "held-out", "pours"}
+    for name, text in (
+        ("coefficient", "camera delay [s]"),
+        ("pours", "observed [% of the liquid]"),
+    ):
+        assert f">{text}<" in drawn[name]
 
 
 def test_a_tie_ranks_what_to_record_next(criticise, made):
@@ -149,10 +156,6 @@ def test_pours_have_their_own_verdict(criticise, said, made):
     assert "pours agree" in of_pours and "5.1 percentage points" in of_pours
     (explained,) = said("poured", tree, stirs=stirs, pours=replace(pours, after=0.02))
     assert "5.1" in explained and "2.0" in explained
-    criticism = criticise(tree, stirs=stirs, pours=pours)
-    figures = figures_of(Results(criticism.base, criticism, None))
-    for text in ("spilled", "retained", "expected [% of the liquid]", "observed [% of the liquid]"):
-        assert f">{text}<" in figures["pours"]
 
 
 @pytest.fixture
