@@ -74,34 +74,39 @@ def _groups(
     inputs: "Inputs", name: str, source: "inference.criticism.Criticism"
 ) -> "dict[str, Dataset]":
     """The groups of "stirs" or "pours"."""
-    if name == "stirs":
+    from xarray import Dataset
+
+    if name == "pours" and (table := inputs.table) is not None:
+        dims, units = ("outcome", "pour"), DIMENSIONLESS
+        coords = {
+            "angular_velocity": ("pour", table.angular_velocity, {"units": "rad s-1"}),
+            "distance": ("pour", table.distance, {"units": "m"}),
+            "outcome": list(OUTCOMES),
+        }
+    else:
         dims, units = ("frame", "plane"), ANGLE
         coords = {
             "time": ("frame", inputs.stirring.time, {"units": "s"}),
             "recording": ("frame", inputs.stirring.member),
             "plane": list(PLANE_NAMES),
         }
-    else:
-        dims, units, table = ("outcome", "pour"), DIMENSIONLESS, inputs.table
-        coords = (
-            {}
-            if table is None
-            else {
-                "angular_velocity": ("pour", table.angular_velocity, {"units": "rad s-1"}),
-                "distance": ("pour", table.distance, {"units": "m"}),
-                "outcome": list(OUTCOMES),
-            }
-        )
+    names = list(source.base.signatures)
+    cosine = {"cosine": (("effect", "other"), source.confusion)}
     groups = {
         "residual": _residual(source, dims, units).assign_coords(coords),
         "where": _where(source, units),
         "effects": _effects(source),
-        "confusion": _confusion(source),
+        "confusion": Dataset(cosine, coords={"effect": names, "other": names}),
     }
     if source.gaps:
         groups["held_out"] = _held_out(source, units)
     if source.suggestions:
-        groups["suggestions"] = _suggestions(source)
+        columns = {
+            "snr": ("experiment", [one.snr for one in source.suggestions]),
+            "between": ("experiment", [" or ".join(one.between) for one in source.suggestions]),
+        }
+        labels = [one.label for one in source.suggestions]
+        groups["suggestions"] = Dataset(columns, coords={"experiment": labels})
     return groups
 
 
@@ -216,16 +221,6 @@ def _status(
     return EffectStatus.LESS_LIKELY
 
 
-def _confusion(source: "inference.criticism.Criticism") -> "Dataset":
-    from xarray import Dataset
-
-    names = list(source.base.signatures)
-    return Dataset(
-        {"cosine": (("effect", "other"), source.confusion)},
-        coords={"effect": names, "other": names},
-    )
-
-
 def _held_out(source: "inference.criticism.Criticism", units: dict[str, str]) -> "Dataset":
     from xarray import Dataset
 
@@ -242,15 +237,3 @@ def _held_out(source: "inference.criticism.Criticism", units: dict[str, str]) ->
     columns["holds"] = ("explanation", [source.holds(key) for key in source.gaps])
     labels = [gap.label for gap in gaps[0]]
     return Dataset(columns, coords={"explanation": names, "recording": labels})
-
-
-def _suggestions(source: "inference.criticism.Criticism") -> "Dataset":
-    from xarray import Dataset
-
-    return Dataset(
-        {
-            "snr": ("experiment", [one.snr for one in source.suggestions]),
-            "between": ("experiment", [" or ".join(one.between) for one in source.suggestions]),
-        },
-        coords={"experiment": [one.label for one in source.suggestions]},
-    )

@@ -209,22 +209,19 @@ def _draw_pours(axes: "Axes", part: "Dataset") -> None:
     axes.plot(ends, ends, color=GREY, linewidth=0.8, zorder=0, label="as expected")
 
 
-def any_fitted(node: "DataTree") -> bool:
-    """Whether an effect was fitted, so that there is a gain to show."""
-    return bool(np.isfinite(node["effects/gain"]).any())
-
-
 def score_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
     """What each effect alone gains when it is fitted (left), and its score before (right).
 
-    Where no effect was fitted, there is no left side."""
+    Where no effect was fitted, there is no left side.
+    """
     effects = node["effects"].to_dataset()
     gain, score = effects["gain"].to_numpy(), np.abs(effects["score"].to_numpy())
     # the last of these decides; NaN, which was not fitted or not tested, goes last
     order = np.lexsort((-np.nan_to_num(score), -np.nan_to_num(gain, nan=-np.inf)))
     names = [spoken(str(name)) for name in effects["effect"].to_numpy()[order]]
     states = [EffectStatus(str(status)) for status in effects["status"].to_numpy()[order]]
-    ratios = (3, 2) if any_fitted(node) else (1,)
+    # without a fitted effect there is no gain to show
+    ratios = (3, 2) if np.isfinite(gain).any() else (1,)
     shape, size = (1, len(ratios)), (8.6, 0.26 * len(names) + 1.2)
     drawn = panels(axes, shape, size, sharey=True, width_ratios=ratios)
     left, right = drawn.grid[0, 0], drawn.grid[0, -1]

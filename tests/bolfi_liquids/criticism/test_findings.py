@@ -36,15 +36,15 @@ def found_in(stirs, pours=None):
 
 
 def source(accepted, extended):
-    base = SimpleNamespace(hypothesis=model((), 0.0))
+    base = SimpleNamespace(hypothesis=model((), 0.0), signatures=())
     concluded = {"accepted": accepted, "extended": extended, "base": base}
-    return SimpleNamespace(**concluded, gaps={}, suggestions=())
+    return SimpleNamespace(**concluded, gaps={}, suggestions=(), confusion=np.zeros((0, 0)))
 
 
 @pytest.fixture
 def attributes(monkeypatch):
     """(stirs, pours, accept) -> attributes of criticism.nc, whose tables stay empty."""
-    for table in ("_residual", "_where", "_effects", "_confusion"):
+    for table in ("_residual", "_where", "_effects"):
         monkeypatch.setattr(criticism_file, table, lambda *_: xr.Dataset())
 
     def attributes(stirs, pours, accept=None):
