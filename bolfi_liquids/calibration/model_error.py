@@ -111,19 +111,24 @@ def check_beside(stirring: StirSimulator, recordings: Sequence[Recording], optio
     Raises:
         InputError: One of them is not.
     """
-    for recording in recordings:
-        others = [one for one in recordings if one is not recording]
-        for what, fix in _faults(stirring, recording, others, option):
+    for at, recording in enumerate(recordings):
+        for what, fix in _faults(stirring, recording, recordings[:at], option):
             raise InputError(what, where=Argument(f"{option} {recording.path}"), fix=fix)
 
 
 def _faults(
-    stirring: StirSimulator, recording: Recording, others: Sequence[Recording], option: str
+    stirring: StirSimulator, recording: Recording, before: Sequence[Recording], option: str
 ) -> Iterator[tuple[str, str]]:
-    """What is wrong with a recording, and what to do about it; see `check_beside`."""
+    """What is wrong with a recording, and what to do about it; see `check_beside`.
+
+    Args:
+        stirring, option: As there.
+        recording: One of the recordings.
+        before: Those before it.
+    """
     first, known = stirring.recordings[0], {one.hash for one in stirring.recordings}
     if option == "held_out" and any(
-        one.hash == recording.hash or one.path.name == recording.path.name for one in others
+        one.hash == recording.hash or one.path.name == recording.path.name for one in before
     ):
         yield (
             "is held out twice, or has the name of another",

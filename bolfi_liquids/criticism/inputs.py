@@ -141,7 +141,7 @@ def open_inputs(
 def _faults(
     settings: CriticismSettings, table: PourTable | None, held_out: PourTable | None
 ) -> Iterator[tuple[str, str, str]]:
-    """Where settings and pours cannot be used, why, and what to do about it."""
+    """Arguments that cannot be used, why, and what to do about each."""
     from ..models import EFFECTS
 
     stir, pour = names_of_effects("stir"), names_of_effects("pour")

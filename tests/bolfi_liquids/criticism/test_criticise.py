@@ -97,6 +97,12 @@ def test_a_clean_recording_that_is_criticised_or_held_out_is_no_baseline(given):
     assert inputs.made_from != given(held_out="held", baseline="clean").made_from
 
 
+def test_one_recording_that_was_opened_is_not_held_out_twice(calibration, given):
+    (one,) = given(held_out="held").held_out
+    with pytest.raises(InputError, match="held_out"):
+        open_inputs(calibration, CriticismSettings(), [one, one], [])
+
+
 @pytest.mark.parametrize(
     ("names", "where"),
     [

@@ -8,8 +8,8 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from multiprocessing import get_context
 
+import numpy as np
 import pytest
-import xarray as xr
 from bolfi_liquids.inference.simulations import Compute
 from typer.testing import CliRunner
 
@@ -20,7 +20,6 @@ from bolfi_liquids.cli.printed import print_pour
 from bolfi_liquids.reporting.facts import calibration_facts, criticism_facts, fit_facts, pour_facts
 from bolfi_liquids.reporting.films import N_DRAWS_SHOWN, films_of
 from bolfi_liquids.reporting.prose import prose
-from bolfi_liquids.run.result_file import _parsed
 from bolfi_liquids.run.run import Run
 
 FIGURES = {
@@ -56,7 +55,7 @@ def read(path):
     return text, page
 
 
-def test_report_is_one_file_with_every_figure(pour):
+def test_report_is_one_file_with_every_figure_and_the_runs_numbers(pour, calibration):
     path = bl.report(pour.path, moving=False)
     assert path == pour.path / "report.html"
     text, page = read(path)
@@ -65,15 +64,10 @@ def test_report_is_one_file_with_every_figure(pour):
     assert page.figures == len(FIGURES)
     for label, figure in FIGURES.items():
         assert label in text, figure
-
-
-@pytest.mark.slow
-def test_report_shows_the_runs_numbers(pour, calibration):
-    text, _ = read(bl.report(pour.path, moving=False))
     summary = calibration.summary
     assert f"{summary.fit_rms_deg:.2f}° RMS" in text
     assert f"{summary.parameters['viscosity'].q50:.3g} Pa s" in text
-    assert f"{pour.chosen.angular_velocity * 57.29578:.1f}°/s" in text
+    assert f"{np.degrees(pour.chosen.angular_velocity):.1f}°/s" in text
     assert re.search("contact angle.* 60°", text)
     assert calibration.record["inputs"]["sha256"][0] in text
 
@@ -116,19 +110,6 @@ def test_films_are_simulated_by_the_executor_within_the_limit(unseen):
         films_of(*results, Compute(pool, 60.0), progress=False)
     (limits, films) = pool.asked
     assert limits == {"timeout": 60.0} and len(films) == 2 * N_DRAWS_SHOWN
-
-
-def test_no_result_is_opened_twice(pour, films, monkeypatch):
-    opened, read = [], xr.open_datatree
-
-    def counted(file, **options):
-        opened.append(file)
-        return read(file, **options)
-
-    monkeypatch.setattr(xr, "open_datatree", counted)
-    _parsed.cache_clear()
-    bl.report(bl.Pour.open(pour.path), progress=False)
-    assert len(opened) == len(("posterior.nc", "pour.nc"))
 
 
 @pytest.mark.slow
