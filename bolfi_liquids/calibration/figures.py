@@ -96,7 +96,7 @@ def draw_angles(
     axes.axhline(0.0, color=GREY, linewidth=0.8, zorder=0)
 
     def text_at(at: int) -> str:
-        shown = [f"{name} {angles[at]:.2f}°" for name, (_, angles) in reversed(lines.items())]
+        shown = [f"{name} {angles[at]:.2f}°" for name, (_, angles) in reversed([*lines.items()])]
         ends = [
             f"{name} {low[at]:.2f}° to {high[at]:.2f}°" for name, (_, low, high) in band.items()
         ]
@@ -134,7 +134,7 @@ def draw_strokes(tree: "DataTree", axes: "Canvas" = None) -> Panels:
 
 def draw_bars(
     axes: "Axes", ticks: Sequence[str], heights: Mapping[str, tuple[str, NDArray]]
-) -> NDArray[np.float64]:
+) -> NDArray:
     """Bars side by side at each of n places.
 
     Args:

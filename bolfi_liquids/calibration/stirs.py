@@ -1,7 +1,7 @@
 """Stirred recordings as experiments that the engine can criticise, and the noise in them."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,7 +139,8 @@ def stir_proposals(
     position, height = recording.gripper.position[:, :2], float(recording.gripper.position[0, 2])
     most = MAX_RADIUS_SHARE * (setup.cup.radius - setup.stick.radius)
     radius = min(max(float(np.linalg.norm(position, axis=1).max()), 0.01), most)
-    at, near = {"height": height, "radius": radius}, {"height": height, "radius": 0.8 * radius}
+    at: dict[str, Any] = {"height": height, "radius": radius}
+    near = at | {"radius": 0.8 * radius}
     paths = {
         f"the star at {100 * faster:.0f} cm/s": star(speed=faster, **at),
         f"the star at {100 * slower:.0f} cm/s": star(speed=slower, **at),

@@ -4,7 +4,7 @@ Each takes the group `stirs` or `pours` of criticism.nc and where to draw, see `
 """
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,7 +112,7 @@ def _shade(axes: "Axes", strokes: "Dataset") -> None:
     for at in np.flatnonzero(sure):
         start, stop = (float(strokes[edge][at]) for edge in ("start_s", "stop_s"))
         axes.axvspan(start, stop, color=ORANGE, alpha=0.14, linewidth=0, zorder=0)
-        style = {"ha": "center", "va": "bottom", "fontweight": "bold"}
+        style: dict[str, Any] = {"ha": "center", "va": "bottom", "fontweight": "bold"}
         transform, number = axes.get_xaxis_transform(), f"{int(strokes['stroke'][at])}"
         axes.text((start + stop) / 2.0, 1.0, number, transform=transform, **style)
 

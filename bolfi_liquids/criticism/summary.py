@@ -161,9 +161,10 @@ class GapSummary:
             f"held_out_{name}": None if of is None else rms(of)
             for name, of in zip(list(numbers), columns, strict=True)
         }
-        return cls(
-            **{name: None if of is None else float(np.degrees(of)) for name, of in numbers.items()}
-        )
+        in_degrees: dict[str, Any] = {
+            name: None if of is None else float(np.degrees(of)) for name, of in numbers.items()
+        }
+        return cls(**in_degrees)
 
 
 def significant_windows(source: "inference.criticism.Criticism") -> tuple[DifferingWindow, ...]:

@@ -31,7 +31,6 @@ from ..wording import (
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-    from pandas import DataFrame
     from xarray import DataTree
 
 Facts = dict[str, Any]
@@ -163,11 +162,11 @@ def criticism_facts(criticism: Criticism) -> Facts:
     """Of a criticism: the verdicts, what it accepted, and the rows of its tables."""
     summary, sources = criticism.summary, dict(criticism.tree.children)
     del sources["posterior"]
-    effects = sources["stirs"]["effects"].to_dataset().to_dataframe()
-    snr, held = effects["snr"].dropna(), _held_out(sources["stirs"])
+    effects, held = _rows(sources["stirs"], "effects"), _held_out(sources["stirs"])
+    snr = {one["effect"]: one["snr"] for one in effects if np.isfinite(one["snr"])}
+    ranked = sorted(snr.items(), key=lambda item: -item[1])
     where = [_place(window) for window in summary.where[:MAX_LISTED]]
-    detectable = snr[snr >= DETECTABLE_SNR].sort_values(ascending=False)
-    gains = effects[effects["gain"] > 0.0].nlargest(MAX_LISTED, "gain")
+    gains = sorted((one for one in effects if one["gain"] > 0.0), key=lambda one: -one["gain"])
     return {
         **vars(summary),
         **verdict_facts(summary),
@@ -189,12 +188,18 @@ def criticism_facts(criticism: Criticism) -> Facts:
         "usual": bool(summary.gap.usual),
         "where": where,
         "more_where": len(summary.where) - len(where),
-        "detectable": {spoken(str(name)): f"{ratio:.0f}" for name, ratio in detectable.items()},
-        "undetectable": snr[snr < DETECTABLE_SNR].index.to_list(),
+        "detectable": {
+            spoken(name): f"{ratio:.0f}" for name, ratio in ranked if ratio >= DETECTABLE_SNR
+        },
+        "undetectable": [name for name, ratio in snr.items() if ratio < DETECTABLE_SNR],
         "detectable_from": f"{DETECTABLE_SNR:.0f}",
         "gains": [
-            {"name": spoken(str(name)), "gain": f"{one['gain']:.1f}", "p": f"{one['p_value']:.2g}"}
-            for name, one in gains.iterrows()
+            {
+                "name": spoken(one["effect"]),
+                "gain": f"{one['gain']:.1f}",
+                "p": f"{one['p_value']:.2g}",
+            }
+            for one in gains[:MAX_LISTED]
         ],
         "holds": {one["explanation"]: one["holds"] for one in held},
         "held_out": held,
@@ -262,50 +267,58 @@ def _place(window: DifferingWindow) -> Facts:
     return {**vars(window), **numbers, "start": start, "stop": stop}
 
 
+def _rows(source: "DataTree", group: str) -> list[dict[str, Any]]:
+    """Rows of a table, by the names of its columns; none where there is no such table."""
+    if group not in source.children:
+        return []
+    table: Any = source[group].to_dataset().to_dataframe().reset_index()
+    return table.to_dict("records")
+
+
 def _held_out(source: "DataTree") -> list[Facts]:
     """Each explanation on each held-out recording."""
-    if "held_out" not in source.children:
-        return []
-    rows = source["held_out"].to_dataset().to_dataframe().iterrows()
     return [
         {
-            "explanation": spoken(explanation),
-            "recording": recording,
+            "explanation": spoken(one["explanation"]),
+            "recording": one["recording"],
             **{key: degrees(np.degrees(one[key])) for key in HELD_OUT_ANGLES},
             "p": f"{one['p_value']:.2g}",
             "gain": f"{one['lpd_gain']:.1f}",
             "holds": bool(one["holds"]),
         }
-        for (explanation, recording), one in rows
+        for one in _rows(source, "held_out")
     ]
 
 
 def _effects(source: "DataTree") -> list[Facts]:
     """Each effect considered for a source."""
-    rows = source["effects"].to_dataset().to_dataframe().iterrows()
-    cosine = source["confusion"].to_dataset()["cosine"].to_pandas()
     return [
         {
-            "name": spoken(name),
-            "typical": _number(one["typical"], ".3g", unit_of(name)),
+            "name": spoken(one["effect"]),
+            "typical": _number(one["typical"], ".3g", unit_of(one["effect"])),
             "snr": _number(one["snr"], ".1f"),
-            "similar": _most_similar(name, cosine),
+            "similar": _most_similar(one["effect"], source["confusion/cosine"]),
             "gain": _number(one["gain"], ".1f"),
             "p": _number(one["p_value"], ".2g"),
-            "coefficient": _number(one["coefficient"], ".3g", unit_of(name)),
+            "coefficient": _number(one["coefficient"], ".3g", unit_of(one["effect"])),
             "status": one["status"],
         }
-        for name, one in rows
+        for one in _rows(source, "effects")
     ]
 
 
-def _most_similar(name: str, cosine: "DataFrame") -> str:
-    """The other effect whose signature is most like an effect's, with their cosine."""
-    if name not in cosine or len(cosine) < 2:
+def _most_similar(name: str, cosine: Any) -> str:
+    """The other effect whose signature is most like an effect's, with their cosine.
+
+    Args:
+        name: Of the effect.
+        cosine: Between the signatures of all that were simulated, over (effect, other).
+    """
+    if name not in cosine["effect"] or cosine.sizes["other"] < 2:
         return NONE
-    others = cosine[name].drop(name)
-    closest = str(others.abs().idxmax())
-    return f"{spoken(closest)} ({others[closest]:.2f})"
+    others = cosine.sel(effect=name).drop_sel(other=name)
+    closest = others.isel(other=int(np.argmax(np.abs(others.to_numpy()))))
+    return f"{spoken(str(closest['other'].item()))} ({closest.item():.2f})"
 
 
 def pour_facts(pour: Pour) -> Facts:
