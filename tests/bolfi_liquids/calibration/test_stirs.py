@@ -99,7 +99,9 @@ def test_clean_recordings_of_the_same_path_say_where_it_errs(stirred, rng):
 
 
 def test_proposed_stirs_stay_within_the_cup_and_below_the_limit_of_speed(stirred, rng):
-    stirring = stir_simulator([noisy(stirred, rng)], 200)
+    gripper, factor = stirred.gripper, np.array([1.5, 1.5, 1.0])  # a path beyond the cup
+    wide = replace(stirred, gripper=Trajectory(gripper.time, factor * gripper.position))
+    stirring = stir_simulator([noisy(wide, rng)], 200)
     made = stir_proposals(stirring, camera_noise(stirring.recordings), None)
     assert len({one.label for one in made}) == len({one.identity for one in made}) == len(made) == 4
     cup, stick = stirring.setups[0].cup, stirring.setups[0].stick
