@@ -40,6 +40,11 @@ def with_unit(name: str, value: float) -> str:
     return f"{value:.3g} {unit_of(name)}".strip()
 
 
+def degrees(angle: float) -> str:
+    """An angle [deg] to hundredths."""
+    return f"{angle:.2f}°"
+
+
 def percent(fraction: float) -> str:
     """A fraction as a percentage of two digits, without decimals above ten."""
     return f"{100 * fraction:{'.0f' if fraction >= WHOLE_PERCENTS_FROM else '.2g'}} %"

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import mkdtemp
@@ -26,7 +26,7 @@ from ..inputs.start import check_start
 from ..progress import after_first, progress_bar
 from ..run.compute import open_compute
 from ..run.given_pours import keep_pours
-from ..run.provenance import versions
+from ..run.provenance import generations, versions
 from ..run.recordings import keep_recordings
 from ..run.run import RUN_TOML, Run
 from ..run.simulations import warn_of_failures
@@ -34,19 +34,19 @@ from ..simulators import StirSimulator, stir_simulator
 from .engine_fit import (
     PREDICTIVE_DRAWS,
     THETA_STAR_REPLICATES,
-    check_of,
     confirmed,
     fit_recordings,
+    results_tree,
 )
 from .model_error import (
     CLEAN_RUNS,
-    check_baseline,
+    check_beside,
     clean_residuals,
     model_error,
     noise_beside,
 )
 from .result import Calibration
-from .stirs import camera_noise, effects_of
+from .stirs import camera_noise
 from .summary import CalibrationSummary
 
 if TYPE_CHECKING:
@@ -139,10 +139,10 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
     )
     prior = _usual_prior(path, resume) if prior is None else prior
-    inputs = CalibrationInputs(settings, prior, stirring, clean)
+    record = run_record(settings, prior, stirring, clean)
     with (
         open_compute(executor, timeout) as compute,
-        Run.begun(path, inputs.record, resume=resume, growing="settings.budget") as run,
+        Run.begun(path, record, resume=resume, growing="settings.budget") as run,
     ):
         keep_recordings(path, stirring.recordings)
         if table is not None:
@@ -151,92 +151,79 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         for notice in recording_warnings(opened):
             logger.warning(notice)
         if run.result("calibrate") is None:
-            _calibrate(run, inputs, compute, progress)
+            _calibrate(run, settings, stirring, clean, compute, progress)
         return Calibration.of(run)
 
 
-@dataclass(frozen=True, eq=False)
-class CalibrationInputs:
-    """What decides a calibration.
-
-    Attributes:
-        settings: The numbers and words.
-        prior: Of the liquid's parameters.
-        stirring: The simulator, with the recordings of one liquid.
-        clean: Clean recordings, of which the simulator's error is learned.
-    """
-
-    settings: CalibrationSettings
-    prior: "Prior"
-    stirring: StirSimulator
-    clean: tuple[Recording, ...] = ()
-
-    @property
-    def record(self) -> dict[str, Any]:
-        """Content of run.toml: settings, inputs, versions; see `run.run.MUST_AGREE`."""
-        from ..inference.engine_version import ENGINE_VERSION
-
-        recordings, clean = self.stirring.recordings, self.clean
-        return {
-            "created": datetime.now(UTC).isoformat(timespec="seconds"),
-            "settings": asdict(self.settings) | {"prior": describe_prior(self.prior)},
-            "engine": {"version": ENGINE_VERSION},
-            "simulator": self.stirring.settings,
-            "inputs": {
-                "sha256": [recording.hash for recording in recordings],
-                **({"baseline": [recording.hash for recording in clean]} if clean else {}),
-            },
-            "files": {"recordings": [recording.path.name for recording in recordings]},
-            "versions": versions(),
-        }
+def run_record(
+    settings: CalibrationSettings,
+    prior: "Prior",
+    stirring: StirSimulator,
+    clean: Sequence[Recording] = (),
+) -> dict[str, Any]:
+    """Content of run.toml: settings, inputs, versions; see `run.run.MUST_AGREE`."""
+    baseline = {"baseline": [recording.hash for recording in clean]} if clean else {}
+    return {
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "settings": asdict(settings) | {"prior": describe_prior(prior)},
+        "engine": {"version": generations()["engine"]},
+        "simulator": stirring.settings,
+        "inputs": {"sha256": [one.hash for one in stirring.recordings], **baseline},
+        "files": {"recordings": [one.path.name for one in stirring.recordings]},
+        "versions": versions(),
+    }
 
 
-def _calibrate(run: Run, inputs: CalibrationInputs, compute: "Compute", progress: bool) -> None:
+def _calibrate(
+    run: Run,
+    settings: CalibrationSettings,
+    stirring: StirSimulator,
+    clean: Sequence[Recording],
+    compute: "Compute",
+    progress: bool,
+) -> None:
     """Search, confirm, judge, and keep the result in the run."""
-    from .posterior_file import results_tree
-
-    settings, stirring = inputs.settings, inputs.stirring
-    judging = PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
-    needed = settings.budget + CLEAN_RUNS * len(inputs.clean) + judging
+    needed = settings.budget + CLEAN_RUNS * len(clean) + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
     with run.bank() as bank, ExitStack() as stack:
         kept = min(len(bank), needed)
         bar = progress_bar("simulating stirs", needed, shown=progress, done=kept)
         advance = after_first(kept, stack.enter_context(bar))
         compute = replace(compute, batch=settings.batch, bank=bank)
+        error, noise = None, None
         # the paper's surrogate has no noise to which an error adds
-        allows = settings.surrogate == "signal"
-        # beside the largest error the search does not settle on one liquid too early
-        search = {"noise": noise_beside(stirring, model_error(stirring, 0.0))} if allows else {}
+        if settings.surrogate == "signal":
+            # beside the largest error the search does not settle on one liquid too early
+            error = model_error(stirring, 0.0)
+            noise = noise_beside(stirring, error)
         fit = fit_recordings(
             stirring,
             stirring.observed,
-            inputs.prior,
+            run.prior,
             compute,
             settings,
             confirm=0,
             warn=False,
             progress=advance,
-            **search,
+            noise=noise,
         )
-        error = None
-        if allows:
-            clean = clean_residuals(  # criticise finds the same simulations
-                inputs.clean,
+        if error is not None:
+            learned = clean_residuals(  # criticise finds the same simulations
+                clean,
                 settings.particles,
-                inputs.prior,
-                effects_of("stir"),
+                run.prior,
                 compute=replace(compute, batch=CriticismSettings.batch),
                 report=lambda _, finished: advance(finished),
             )
-            error = model_error(stirring, fit.best["viscosity"], clean)
-        fit = confirmed(fit, error, stirring, compute, settings, advance)
+            error = model_error(stirring, fit.best["viscosity"], learned)
+            noise = noise_beside(stirring, error)
+        fit = confirmed(fit, noise, stirring, compute, settings, advance)
         warn_of_failures(fit.history.why.tolist(), compute.timeout)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )
-        check = check_of(fit, stirring, settings.seed, compute, advance=advance)
-    tree = results_tree(sampled, fit, stirring, check)
-    summary = CalibrationSummary.from_fit(tree, fit, stirring, check, error, settings.budget)
+        tree = results_tree(sampled, fit, stirring, settings.seed, compute, advance)
+    names = tuple(one.path.name for one in clean)
+    summary = CalibrationSummary.from_fit(tree, fit, stirring, settings.budget, error, names)
     run.keep("calibrate", tree, run.made_from, summary.to_json())
 
 
@@ -247,32 +234,12 @@ def _usual_prior(path: Path, resume: bool) -> "Prior":
     return read_prior(settings["prior"]) if "prior" in settings else default_prior()
 
 
-def _open_clean(
-    baseline: Source | Sequence[Source], stirring: StirSimulator, surrogate: str
-) -> tuple[Recording, ...]:
-    """Clean recordings beside which a run's can be calibrated.
+def _open_all(recordings: Source | Sequence[Source]) -> list[Recording]:
+    """Recordings of one liquid, each once.
 
     Raises:
         InputError: They cannot be used.
     """
-    clean = tuple(open_recordings(baseline, Argument("baseline")))
-    if clean and surrogate != "signal":
-        raise InputError(
-            f"clean recordings, but the surrogate {surrogate!r} does not allow for an error",
-            where=Argument("baseline"),
-            fix="leave them out, or take the surrogate 'signal'",
-        )
-    check_baseline(stirring, clean)
-    for recording in clean:
-        if recording.hash in {one.hash for one in stirring.recordings}:
-            fix = "give another recording: this one would count as free of errors"
-            where = Argument(f"baseline {recording.path}")
-            raise InputError("is what is calibrated on", where=where, fix=fix)
-        camera_noise([recording])  # refuses one that rests too shortly
-    return clean
-
-
-def _open_all(recordings: Source | Sequence[Source]) -> list[Recording]:
     opened = open_recordings(recordings)
     if not opened:
         raise InputError("no recording given", where="recordings", fix="give at least one")
@@ -282,3 +249,24 @@ def _open_all(recordings: Source | Sequence[Source]) -> list[Recording]:
         names = ", ".join(str(recording.path) for recording in opened)
         raise InputError("the same recording twice", where=names, fix="give each of them once")
     return opened
+
+
+def _open_clean(
+    baseline: Source | Sequence[Source], stirring: StirSimulator, surrogate: str
+) -> list[Recording]:
+    """Clean recordings beside which a run's can be calibrated.
+
+    Raises:
+        InputError: They cannot be used.
+    """
+    clean = open_recordings(baseline, Argument("baseline"))
+    if clean and surrogate != "signal":
+        raise InputError(
+            f"clean recordings, but the surrogate {surrogate!r} does not allow for an error",
+            where=Argument("baseline"),
+            fix="leave them out, or take the surrogate 'signal'",
+        )
+    check_beside(stirring, clean, "baseline")
+    for recording in clean:
+        camera_noise([recording])  # refuses one that rests too shortly
+    return clean

@@ -1,5 +1,10 @@
-"""Figures of a calibration: the fit in time and by stroke, the posterior, the search."""
+"""Figures of a calibration: the fit in time and by stroke, the posterior, the search.
 
+Each takes posterior.nc and where to draw, see `drawing.panels`. What a criticism draws, too, is
+drawn by `draw_angles` and `draw_bars`.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +14,6 @@ from ..drawing import (
     BLUE,
     GREY,
     INK,
-    LIGHT,
     ORANGE,
     Panels,
     hover,
@@ -29,6 +33,7 @@ if TYPE_CHECKING:
 PLANE_COLOURS = (BLUE, ORANGE)
 AXIS_LABELS = {"viscosity": "viscosity [Pa s]", "cohesion": "cohesion [dimensionless]"}
 LOGARITHMIC_PARAMETERS = ("viscosity",)
+BAR_WIDTH = 0.8  # of all bars at one place
 
 CONTOUR_SHARES = (0.9, 0.5)
 """Probability inside each contour."""
@@ -38,25 +43,26 @@ POSTERIOR_INTERVAL = 0.05, 0.95
 
 
 def draw_fit(tree: "DataTree", axes: "Canvas" = None) -> Panels:
-    """Inclination against time: recorded, closest hypothesis and posterior prediction.
-
-    One row of axes for each recording, one column for each plane.
-
-    Args:
-        tree: posterior.nc.
-        axes: Where to draw, see `drawing.panels`.
-    """
+    """Inclination against time: recorded, closest hypothesis and posterior prediction; a row for
+    each recording, a column for each plane."""
     members = _by_recording(tree, "recorded", "closest", "posterior_predictive")
     size = 8.6, 2.6 * len(members) + 0.4
     drawn = panels(axes, (len(members), 2), size, sharex="row", sharey=True)
     for row, parts in zip(drawn.grid, members, strict=True):
+        time = parts["recorded"]["time"].to_numpy()
         for axis, plane in zip(row, parts["recorded"]["plane"].to_numpy(), strict=True):
-            _draw_inclination(axis, {name: one.sel(plane=plane) for name, one in parts.items()})
+            recorded, closest, predicted = (
+                np.degrees(one["inclination"].sel(plane=plane).to_numpy()) for one in parts.values()
+            )
+            draws = predicted.reshape(-1, len(time))
+            lines = {"closest hypothesis": (ORANGE, closest), "recorded": (INK, recorded)}
+            band = f"range of {len(draws)} posterior predictions"
+            draw_angles(axis, time, lines, {band: (BLUE, draws.min(axis=0), draws.max(axis=0))})
             axis.set_title(f"{plane} plane", loc="left")
         row[0].set_ylabel("inclination [deg]")
     for axis in drawn.grid[-1]:
         axis.set_xlabel("time [s]")
-    drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
+    add_legend(drawn, drawn.grid[0, 0])
     return drawn
 
 
@@ -69,117 +75,150 @@ def _by_recording(tree: "DataTree", *groups: str) -> list[dict[str, "Dataset"]]:
     ]
 
 
-def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> None:
-    time = part["recorded"]["time"].to_numpy()
-    degrees = {name: np.degrees(data["inclination"].to_numpy()) for name, data in part.items()}
-    predicted = degrees["posterior_predictive"].reshape(-1, len(time))
-    low, high = predicted.min(axis=0), predicted.max(axis=0)
-    axes.fill_between(
-        time,
-        low,
-        high,
-        color=BLUE,
-        alpha=0.25,
-        linewidth=0,
-        label=f"range of {len(predicted)} posterior predictions",
-    )
-    axes.plot(time, degrees["closest"], color=ORANGE, linewidth=1.1, label="closest hypothesis")
-    axes.plot(time, degrees["recorded"], color=INK, linewidth=0.9, label="recorded")
-    axes.axhline(0.0, color=LIGHT, linewidth=0.8, zorder=0)
+def draw_angles(
+    axes: "Axes",
+    time: NDArray,
+    lines: Mapping[str, tuple[str, NDArray]],
+    band: Mapping[str, tuple[str, NDArray, NDArray]],
+) -> None:
+    """Angles [deg] against time (T,) [s].
+
+    Args:
+        axes: Where to draw.
+        time: Of the samples.
+        lines: Label -> colour and angles (T,); the last is on top.
+        band: Label -> colour, and the lower and upper end (T,), of what is shaded.
+    """
+    for label, (colour, low, high) in band.items():
+        axes.fill_between(time, low, high, color=colour, alpha=0.25, linewidth=0, label=label)
+    for label, (colour, angles) in lines.items():
+        axes.plot(time, angles, color=colour, linewidth=1.1, label=label)
+    axes.axhline(0.0, color=GREY, linewidth=0.8, zorder=0)
 
     def text_at(at: int) -> str:
-        return (
-            f"{time[at]:.2f} s: recorded {degrees['recorded'][at]:.2f}°, closest "
-            f"{degrees['closest'][at]:.2f}°, predicted {low[at]:.2f}° to {high[at]:.2f}°"
-        )
+        shown = [f"{name} {angles[at]:.2f}°" for name, (_, angles) in reversed([*lines.items()])]
+        ends = [
+            f"{name} {low[at]:.2f}° to {high[at]:.2f}°" for name, (_, low, high) in band.items()
+        ]
+        return f"{time[at]:.2f} s: {', '.join(shown + ends)}"
 
     hover_strips(axes, time, text_at)
 
 
 def draw_strokes(tree: "DataTree", axes: "Canvas" = None) -> Panels:
     """RMS of recorded less predicted inclination by stroke and plane, a row for each recording;
-    beside it the sd of the predictions.
-
-    Args:
-        tree: posterior.nc.
-        axes: Where to draw, see `drawing.panels`.
-    """
+    beside it the sd of the predictions."""
     members = _by_recording(tree, "recorded", "posterior_predictive")
     drawn = panels(axes, (len(members), 1), (8.6, 2.2 * len(members) + 0.4))
     for axis, parts in zip(drawn.grid[:, 0], members, strict=True):
-        _draw_strokes(axis, parts["recorded"], parts["posterior_predictive"])
+        recorded, predicted = parts.values()
+        numbers = recorded["stroke"].to_numpy()
+        strokes = [str(number) for number in np.unique(numbers)]
+        seen = np.degrees(recorded["inclination"].to_numpy())
+        shown = np.degrees(predicted["inclination"].to_numpy()).reshape(-1, *seen.shape)
+        left, planes = seen - shown.mean(axis=0), recorded["plane"].to_numpy()
+        heights = {
+            f"{plane} plane": (colour, rms_by(numbers, left[:, at]))
+            for at, (plane, colour) in enumerate(zip(planes, PLANE_COLOURS, strict=True))
+        }
+        draw_bars(axis, strokes, heights)
+        usual = np.pad(rms_by(numbers, shown.std(axis=0, ddof=1)), 1, mode="edge")
+        places, label = np.arange(-1, len(strokes) + 1), "sd of the predictions"
+        axis.step(places, usual, where="mid", color=INK, lw=1.0, label=label)
+        axis.set_xlim(-0.6, len(strokes) - 0.4)
         axis.set_ylabel("RMS [deg]")
     drawn.grid[-1, 0].set_xlabel("stroke")
-    drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
+    add_legend(drawn, drawn.grid[0, 0])
     return drawn
 
 
-def _draw_strokes(axes: "Axes", recorded: "Dataset", predicted: "Dataset") -> None:
-    numbers = recorded["stroke"].to_numpy()
-    strokes = np.unique(numbers)
-    seen = np.degrees(recorded["inclination"].to_numpy())
-    shown = np.degrees(predicted["inclination"].to_numpy()).reshape(-1, *seen.shape)
-    left, spread = seen - shown.mean(axis=0), shown.std(axis=0, ddof=1)
-    for at, plane in enumerate(recorded["plane"].to_numpy()):
-        rms = _rms_by(numbers, left[:, at])
-        place = np.arange(len(strokes)) + 0.4 * (at - 0.5)
-        bars = axes.bar(place, rms, 0.36, color=PLANE_COLOURS[at], label=f"{plane} plane")
-        for bar, number, height in zip(bars, strokes, rms, strict=True):
-            hover(bar, f"stroke {number}, {plane} plane: {height:.2f}°")
-    usual = _rms_by(numbers, spread)
-    axes.step(np.arange(-1, len(strokes) + 1), np.pad(usual, 1, mode="edge"), where="mid",
-              color=INK, lw=1.0, label="sd of the predictions")  # fmt: skip
-    axes.set_xlim(-0.6, len(strokes) - 0.4)
-    axes.set_xticks(range(len(strokes)), [str(number) for number in strokes])
+def draw_bars(
+    axes: "Axes", ticks: Sequence[str], heights: Mapping[str, tuple[str, NDArray]]
+) -> NDArray:
+    """Bars side by side at each of n places.
+
+    Args:
+        axes: Where to draw.
+        ticks: Names of the places.
+        heights: Label -> colour and heights (n,) [deg].
+
+    Returns:
+        Middles of the first bars (n,).
+    """
+    width = BAR_WIDTH / len(heights)
+    first = np.arange(len(ticks)) - (BAR_WIDTH - width) / 2.0
+    for k, (label, (colour, high)) in enumerate(heights.items()):
+        bars = axes.bar(first + k * width, high, 0.9 * width, color=colour, label=label)
+        for bar, tick, height in zip(bars, ticks, high, strict=True):
+            hover(bar, f"{tick}, {label}: {height:.2f}°")
+    axes.set_xticks(range(len(ticks)), ticks)
+    return first
 
 
-def _rms_by(numbers: NDArray, values: NDArray) -> NDArray[np.float64]:
+def rms_by(numbers: NDArray, values: NDArray) -> NDArray[np.float64]:
     """RMS of values (T,) or (T, planes) in each group of equal numbers (T,)."""
     groups = [values[numbers == number] for number in np.unique(numbers)]
     seen = [group[np.isfinite(group)] for group in groups]  # none where all samples are missing
     return np.array([np.sqrt(np.mean(part**2)) if part.size else np.nan for part in seen])
 
 
-def draw_posterior(tree: "DataTree", ax: "Canvas" = None) -> Panels:
-    """Contours of the joint posterior, in a figure of its own with marginals and the prior's.
+def add_legend(drawn: Panels, *axes: "Axes", ncols: int = 3) -> None:
+    """The legend of a plot: what these axes label, each label once."""
+    entries: dict[str, object] = {}
+    for one in axes:
+        handles, labels = one.get_legend_handles_labels()
+        entries |= dict(zip(labels, handles, strict=True))
+    drawn.legend(list(entries.values()), list(entries), ncols=ncols)
 
-    Args:
-        tree: posterior.nc.
-        ax: Where to draw the contours alone; None or an empty figure: the marginals, too.
-    """
+
+def draw_posterior(tree: "DataTree", ax: "Canvas" = None) -> Panels:
+    """Contours of the joint posterior in the axes that are given; in a figure of its own with the
+    marginals, the prior's, too."""
     from matplotlib.figure import Figure
 
     surface = tree["surface"].to_dataset()
-    first, second = map(str, surface["log_posterior"].dims)
-    posterior, coordinates = grid_density(surface)
-    axes_of = dict(zip((first, second), coordinates, strict=True))
+    names = [str(name) for name in surface["log_posterior"].dims]
+    density, (first, second) = grid_density(surface)
     if ax is None or isinstance(ax, Figure):
         ratios = {"width_ratios": (3, 1), "height_ratios": (1, 3)}
         drawn = panels(ax, (2, 2), (6.2, 4.8), sharex="col", sharey="row", gridspec_kw=ratios)
-        _draw_marginals(drawn, surface, posterior, axes_of)
+        top, right = drawn.grid[0, 0], drawn.grid[1, 1]
+        drawn.grid[0, 1].set_axis_off()
+        prior, _ = grid_density(surface, "log_prior")
+        for of, style in ((density, {"color": BLUE}), (prior, {"color": GREY, "ls": "--"})):
+            top.plot(surface[names[0]], marginal(of, first, second), **style)
+            right.plot(marginal(of.T, second, first), surface[names[1]], **style)
+        top.set_ylim(bottom=0)
+        top.set_yticks([])
+        right.set_xlim(left=0)
+        right.set_xticks([])
     else:
         drawn = panels(ax, (1, 1), (4.6, 3.6))
     joint = drawn.grid[-1, 0]
-    _draw_joint(joint, surface, posterior, axes_of)
-    _mark(joint, tree, (first, second))
-    _finish(drawn, joint, (first, second))
+    cells = np.outer(np.gradient(first), np.gradient(second))
+    levels, on = contour_levels(density * cells, density), [surface[name] for name in names]
+    joint.contourf(*on, density.T, levels=[*levels, np.inf], colors=[BLUE, BLUE], alpha=0.25)
+    joint.contour(*on, density.T, levels=levels, colors=BLUE, linewidths=1.0)
+    _mark_simulations(joint, tree, names)
+    for name, which in zip(names, "xy", strict=True):
+        if name in LOGARITHMIC_PARAMETERS:
+            plain_log_ticks(joint, which)
+    joint.set_xlabel(AXIS_LABELS.get(names[0], names[0]))
+    joint.set_ylabel(AXIS_LABELS.get(names[1], names[1]))
+    joint.plot([], [], color=BLUE, label="posterior, 50 % and 90 %")
+    if drawn.own:
+        joint.plot([], [], color=GREY, linestyle="--", label="prior")
+    add_legend(drawn, joint, ncols=4)
     return drawn
 
 
-def _draw_marginals(
-    drawn: Panels, surface: "Dataset", posterior: NDArray, axes_of: dict[str, NDArray]
-) -> None:
-    first, second = axes_of
-    top, right = drawn.grid[0, 0], drawn.grid[1, 1]
-    drawn.grid[0, 1].set_axis_off()
-    prior, _ = grid_density(surface, "log_prior")
-    for density, style in ((posterior, {"color": BLUE}), (prior, {"color": GREY, "ls": "--"})):
-        top.plot(surface[first], marginal(density, *axes_of.values()), **style)
-        right.plot(marginal(density.T, *reversed(axes_of.values())), surface[second], **style)
-    top.set_ylim(bottom=0)
-    top.set_yticks([])
-    right.set_xlim(left=0)
-    right.set_xticks([])
+def _mark_simulations(joint: "Axes", tree: "DataTree", names: Sequence[str]) -> None:
+    """Mark where the search simulated, and the closest simulation."""
+    x, y = (tree["simulations"][name].to_numpy() for name in names)
+    joint.plot(x, y, ".", color=GREY, markersize=4, label="simulated")
+    at = [tree["closest"][name].to_numpy() for name in names]
+    joint.plot(*at, "*", color=ORANGE, markersize=10, label="closest hypothesis")
+    hover_points(joint, x, y, _simulation_texts({names[0]: x, names[1]: y}))
 
 
 def grid_density(
@@ -228,53 +267,9 @@ def contour_levels(mass: NDArray, density: NDArray) -> list[float]:
     return [float(ranked[np.searchsorted(inside, share)]) for share in CONTOUR_SHARES]
 
 
-def _draw_joint(
-    joint: "Axes", surface: "Dataset", density: NDArray, axes_of: dict[str, NDArray]
-) -> None:
-    first, second = axes_of
-    cells = np.outer(np.gradient(axes_of[first]), np.gradient(axes_of[second]))
-    levels = contour_levels(density * cells, density)
-    x, y = surface[first], surface[second]
-    joint.contourf(x, y, density.T, levels=[*levels, np.inf], colors=[BLUE, BLUE], alpha=0.25)
-    joint.contour(x, y, density.T, levels=levels, colors=BLUE, linewidths=1.0)
-
-
-def _mark(joint: "Axes", tree: "DataTree", names: tuple[str, str]) -> None:
-    simulations, closest = tree["simulations"], tree["closest"]
-    x, y = (simulations[name].to_numpy() for name in names)
-    joint.plot(x, y, ".", color=GREY, markersize=4, label="simulated")
-    at = [closest[name].to_numpy() for name in names]
-    joint.plot(*at, "*", color=ORANGE, markersize=10, label="closest hypothesis")
-    texts = [
-        f"simulation {number}: {names[0]} {first:.3g}, {names[1]} {second:.3g}"
-        for number, (first, second) in enumerate(zip(x, y, strict=True), start=1)
-    ]
-    hover_points(joint, x, y, texts)
-
-
-def _finish(drawn: Panels, joint: "Axes", names: tuple[str, str]) -> None:
-    first, second = names
-    for name, which in ((first, "x"), (second, "y")):
-        if name in LOGARITHMIC_PARAMETERS:
-            plain_log_ticks(joint, which)
-    joint.set_xlabel(AXIS_LABELS.get(first, first))
-    joint.set_ylabel(AXIS_LABELS.get(second, second))
-    joint.plot([], [], color=BLUE, label="posterior, 50 % and 90 %")
-    if drawn.own:
-        joint.plot([], [], color=GREY, linestyle="--", label="prior")
-    drawn.legend(*joint.get_legend_handles_labels(), ncols=4)
-    joint.tick_params(colors=INK)
-
-
 def draw_search(tree: "DataTree", axes: "Canvas" = None) -> Panels:
     """Discrepancy of each simulation in turn with the least so far, and below it the parameters
-    that it tried, before the posterior; the start design is hollow.
-
-    Args:
-        tree: posterior.nc.
-        axes: Where to draw, see `drawing.panels`; one for the discrepancy and one for each
-            parameter.
-    """
+    that it tried, before the posterior; the start design is hollow."""
     from matplotlib.ticker import MaxNLocator
 
     simulations = tree["simulations"].to_dataset()
@@ -283,58 +278,47 @@ def draw_search(tree: "DataTree", axes: "Canvas" = None) -> Panels:
     discrepancy = np.degrees(np.degrees(simulations["discrepancy"].to_numpy()))
     iteration = np.arange(1, len(discrepancy) + 1)
     start = iteration <= int(tree.attrs["initial"])
-    texts = _texts(names, simulations, discrepancy)
+    tried = {name: simulations[name].to_numpy() for name in names}
+    texts = [
+        text + (f"; discrepancy {off:.3g} deg² s" if np.isfinite(off) else "; failed")
+        for text, off in zip(_simulation_texts(tried), discrepancy, strict=True)
+    ]
+
+    def dots(axis: "Axes", values: NDArray) -> None:
+        for at, face, label in (
+            (start, "white", "start design"),
+            (~start, BLUE, "engine's choice"),
+        ):
+            style = {"ms": 5, "color": BLUE, "markerfacecolor": face, "label": label}
+            axis.plot(iteration[at], values[at], "o", **style)
+        hover_points(axis, iteration, values, texts)
+
     size, ratios = (6.4, 2.6 + 1.5 * len(names)), [1.5] + [1.0] * len(names)
     drawn = panels(axes, (1 + len(names), 1), size, sharex=True, height_ratios=ratios)
     first, *others = drawn.grid[:, 0]
     least = np.fmin.accumulate(discrepancy)
     first.step(iteration, least, where="post", color=GREY, linewidth=1.0, label="least so far")
-    _dots(first, iteration, discrepancy, start, texts)
+    dots(first, discrepancy)
     plain_log_ticks(first, "y")
     first.set_ylabel("discrepancy [deg² s]")
-    for axis, name in zip(others, names, strict=True):
+    for axis, (name, values) in zip(others, tried.items(), strict=True):
         low, high = np.quantile(tree["posterior"][name].to_numpy(), POSTERIOR_INTERVAL)
         axis.axhspan(low, high, color=BLUE, alpha=0.15, linewidth=0, label="posterior, 90 %")
-        _dots(axis, iteration, simulations[name].to_numpy(), start, texts)
+        dots(axis, values)
         axis.set_ylabel(AXIS_LABELS.get(name, name))
         if name in LOGARITHMIC_PARAMETERS:
             plain_log_ticks(axis, "y")
     others[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
     others[-1].set_xlabel("simulation")
-    handles, labels = first.get_legend_handles_labels()
-    more, more_labels = others[0].get_legend_handles_labels()
-    drawn.legend([*handles, more[0]], [*labels, more_labels[0]], ncols=4)
+    add_legend(drawn, first, others[0], ncols=4)
     return drawn
 
 
-def _texts(names: list[str], simulations: "Dataset", discrepancy: NDArray) -> list[str]:
-    """Parameters and discrepancy of each simulation."""
-    tried = [simulations[name].to_numpy() for name in names]
+def _simulation_texts(tried: Mapping[str, NDArray]) -> list[str]:
+    """Number and parameters of each of n simulations; `tried` has them by name, (n,)."""
+    rows: Iterable[tuple[float, ...]] = zip(*tried.values(), strict=True)
     return [
-        f"simulation {at + 1}: "
-        + ", ".join(
-            f"{name} {with_unit(name, values[at])}"
-            for name, values in zip(names, tried, strict=True)
-        )
-        + (f"; discrepancy {off:.3g} deg² s" if np.isfinite(off) else "; failed")
-        for at, off in enumerate(discrepancy)
+        f"simulation {number}: "
+        + ", ".join(f"{name} {with_unit(name, of)}" for name, of in zip(tried, row, strict=True))
+        for number, row in enumerate(rows, start=1)
     ]
-
-
-def _dots(
-    axes: "Axes", iteration: NDArray, values: NDArray, start: NDArray, texts: list[str]
-) -> None:
-    for chosen, face, label in (
-        (start, "white", "start design"),
-        (~start, BLUE, "engine's choice"),
-    ):
-        axes.plot(
-            iteration[chosen],
-            values[chosen],
-            "o",
-            markersize=5,
-            color=BLUE,
-            markerfacecolor=face,
-            label=label,
-        )
-    hover_points(axes, iteration, values, texts)

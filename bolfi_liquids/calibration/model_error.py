@@ -1,6 +1,6 @@
 """The simulator's own error: the usual one, or what it leaves on clean recordings."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,14 +10,21 @@ from numpy.typing import NDArray
 from ..errors import Argument, InputError
 from ..inputs.recording import Recording
 from ..models import stirring_error
-from ..simulators import StirSimulator, stir_simulator
-from .noise import sensor_noise
-from .stirs import camera_noise, frame_interval, same_experiment, same_rate, stir_experiment
+from ..simulators import StirSimulator, same_liquid, stir_simulator
+from .stirs import (
+    camera_noise,
+    effects_of,
+    frame_interval,
+    same_experiment,
+    same_rate,
+    sensor_noise,
+    stir_experiment,
+)
 
 if TYPE_CHECKING:
     from .. import inference
     from ..inference import Prior
-    from ..inference.criticism import Extension, Report, SumOfNoises
+    from ..inference.criticism import ModelError, Report, SumOfNoises
     from ..inference.simulations import Compute
 
 STARTING_RUNS = 4  # of each clean recording, all over the prior; as many follow near the best
@@ -58,7 +65,6 @@ def clean_residuals(
     recordings: Sequence[Recording],
     particles: int,
     prior: "Prior",
-    extensions: "dict[str, Extension]",
     compute: "Compute",
     report: "Report",
 ) -> list[Clean]:
@@ -68,7 +74,6 @@ def clean_residuals(
         recordings: Clean ones.
         particles: Number of particles of the simulated liquid; 0: cells follow the stick.
         prior: Of the liquid's parameters.
-        extensions: The effects that may act.
         compute: Where simulations are made and kept.
         report: Called with the phase and the number of simulations finished in it.
 
@@ -88,37 +93,69 @@ def clean_residuals(
         experiment = stir_experiment(stir_simulator([recording], particles), cameras, None, name)
         # with one seed for all, no criticism in this run simulates what another did
         left = own_residual(
-            experiment, prior, extensions, compute, report=counted, start=STARTING_RUNS
+            experiment, prior, effects_of("stir"), compute, report=counted, start=STARTING_RUNS
         )
         return Clean(recording, left.residual, left.best.get("viscosity"), sum(made))
 
     return [learn(recording) for recording in recordings]
 
 
-def check_rig(stirring: StirSimulator, recording: Recording, where: str) -> None:
-    """Raise `InputError` unless a recording has the sizes of the run's rig."""
+def check_beside(stirring: StirSimulator, recordings: Sequence[Recording], option: str) -> None:
+    """Refuse recordings that cannot be compared with those of a run.
+
+    Args:
+        stirring: What the run is calibrated on.
+        recordings: Others of the same rig.
+        option: Under which they were given: those of "held_out" are of the same liquid, each once
+            and under a name of its own; those of "baseline" have the same frame rate.
+
+    Raises:
+        InputError: One of them is not.
+    """
+    for at, recording in enumerate(recordings):
+        for what, fix in _faults(stirring, recording, recordings[:at], option):
+            raise InputError(what, where=Argument(f"{option} {recording.path}"), fix=fix)
+
+
+def _faults(
+    stirring: StirSimulator, recording: Recording, before: Sequence[Recording], option: str
+) -> Iterator[tuple[str, str]]:
+    """What is wrong with a recording, and what to do about it; see `check_beside`.
+
+    Args:
+        stirring, option: As there.
+        recording: One of the recordings.
+        before: Those before it.
+    """
+    first, known = stirring.recordings[0], {one.hash for one in stirring.recordings}
+    if option == "held_out" and any(
+        one.hash == recording.hash or one.path.name == recording.path.name for one in before
+    ):
+        yield (
+            "is held out twice, or has the name of another",
+            "give each recording once, and each a name of its own",
+        )
+    if recording.hash in known:
+        yield (
+            "is what the run is calibrated on",
+            "give another recording: nothing can be proved on data that are fitted",
+        )
     for name in RIG_SIZES:
-        there, here = recording.number(name), stirring.recordings[0].number(name)
+        there, here = recording.number(name), first.number(name)
         if abs(there - here) > SIZE_TOLERANCE * abs(here):
-            raise InputError(
-                f"{name} is {there:g}, but {here:g} in the run",
-                where=where,
-                fix="give recordings of the same rig",
-            )
-
-
-def check_baseline(stirring: StirSimulator, baseline: Sequence[Recording]) -> None:
-    """Raise `InputError` unless clean recordings are of the run's rig and frame rate."""
-    first = stirring.recordings[0]
-    for recording in baseline:
-        check_rig(stirring, recording, Argument(f"baseline {recording.path}"))
-        if not same_rate(recording, first):
-            there, here = (1.0 / frame_interval(r) for r in (recording, first))
-            raise InputError(
-                f"has {there:.3g} samples a second, but the run's recording {here:.3g}",
-                where=Argument(f"baseline {recording.path}"),
-                fix="give recordings of the same frame rate",
-            )
+            yield f"{name} is {there:g}, but {here:g} in the run", "give recordings of the same rig"
+    if option == "held_out" and not same_liquid(recording, first):
+        there, here = (one.number("liquid_density") for one in (recording, first))
+        yield (
+            f"liquid_density is {there:g} kg/m3, but {here:g} in the run",
+            "hold out a recording of the same liquid",
+        )
+    if option == "baseline" and not same_rate(recording, first):
+        there, here = (1.0 / frame_interval(one) for one in (recording, first))
+        yield (
+            f"has {there:.3g} samples a second, but the run's recording {here:.3g}",
+            "give recordings of the same frame rate",
+        )
 
 
 def usual_for(
@@ -173,31 +210,11 @@ def regime_distance(
     return np.log(ratio) / np.log(VISCOSITY_FACTOR)
 
 
-@dataclass(frozen=True, eq=False)
-class ModelError:
-    """The simulator's error on a run's recordings.
-
-    It is that of one viscosity, the best one beside the largest error.
-
-    Attributes:
-        usual: The error, as a process over time.
-        clean: Names of the recordings from which it was learned; none where it is what is known
-            of the simulator.
-    """
-
-    usual: "inference.criticism.ModelError"
-    clean: tuple[str, ...] = ()
-
-    @property
-    def rms(self) -> float:
-        """Of the inclination [rad]."""
-        return float(np.sqrt(self.usual.autocovariance[0]))
-
-
 def model_error(
     stirring: StirSimulator, viscosity: float, clean: Sequence[Clean] = ()
-) -> ModelError:
-    """The error in a liquid of so many Pa s, learned from clean recordings where there are any.
+) -> "ModelError":
+    """The simulator's error on a run's recordings, in a liquid of so many Pa s; learned from clean
+    recordings where there are any.
 
     Without them it has two parts. One, of size `models.stirring_error`, is correlated as the
     recorded inclination is: in the reference's oil the simulated stick swings as if the viscosity
@@ -209,16 +226,16 @@ def model_error(
 
     learned = usual_for(stirring, clean, viscosity)
     if learned is not None:
-        return ModelError(learned, tuple(one.recording.path.name for one in clean))
+        return learned
     swings = rhythm(stirring.observed)
     lags = frame_interval(stirring.recordings[0]) * np.arange(len(swings))
     share = SHORT_PART**2
     correlation = (swings + share * np.exp(-lags / SHORT_TIME)) / (1.0 + share)
-    return ModelError(model_error(stirring_error(viscosity) * np.sqrt(1.0 + share), correlation))
+    return model_error(stirring_error(viscosity) * np.sqrt(1.0 + share), correlation)
 
 
-def noise_beside(stirring: StirSimulator, error: ModelError) -> "SumOfNoises":
+def noise_beside(stirring: StirSimulator, error: "ModelError") -> "SumOfNoises":
     """The cameras' noise and the simulator's error."""
     from ..inference.criticism import KnownNoise, SumOfNoises
 
-    return SumOfNoises((KnownNoise(sensor_noise(stirring.observed)), error.usual))
+    return SumOfNoises((KnownNoise(sensor_noise(stirring.observed)), error))

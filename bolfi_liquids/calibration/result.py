@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..drawing import shown
 from ..run.run import Run, RunOrPath, key_of
 from ..seeds import Phase, generator
 from ..wording import html_table
+from .figures import draw_fit, draw_posterior, draw_search
 from .summary import CalibrationSummary, bad_fit
 
 if TYPE_CHECKING:
@@ -31,7 +33,7 @@ class Calibration:
 
     Attributes:
         run: What it was made from.
-        tree: posterior.nc, in ArviZ's schema; groups as in `calibration.posterior_file`.
+        tree: posterior.nc, in ArviZ's schema; groups as in `calibration.engine_fit`.
         summary: The section "calibrate" of summary.json.
     """
 
@@ -104,6 +106,14 @@ class Calibration:
         return self.run.prior
 
     @property
+    def learned_from(self) -> tuple[dict[str, NDArray], NDArray, NDArray]:
+        """Simulations that succeeded: parameters (n,), signals (n, T, 2) [rad], seeds (n,)."""
+        made = self.tree["simulations"].to_dataset()
+        good = ~made["failed"].to_numpy()
+        theta = {name: made[name].to_numpy()[good] for name in self.prior.names}
+        return theta, made["signal"].to_numpy()[good], made["seed"].to_numpy()[good]
+
+    @property
     def added(self) -> tuple[str, ...]:
         """Effects that a criticism has added to the liquid's parameters."""
         searched = self.tree["simulations"].to_dataset()
@@ -127,9 +137,6 @@ class Calibration:
             ValueError: A criticism has added effects; there is no such plot with them.
         """
         self._check_plot("plot_residuals")
-        from ..drawing import shown
-        from .figures import draw_fit
-
         return shown(partial(draw_fit, self.tree), axes)
 
     def plot_posterior(self, ax: "Axes | None" = None) -> "NDArray[Any]":
@@ -145,9 +152,6 @@ class Calibration:
             ValueError: A criticism has added effects; there is no such plot with them.
         """
         self._check_plot("plot_coefficient")
-        from ..drawing import shown
-        from .figures import draw_posterior
-
         return shown(partial(draw_posterior, self.tree), ax)
 
     def plot_search(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
@@ -159,12 +163,10 @@ class Calibration:
         Returns:
             The axes.
         """
-        from ..drawing import shown
-        from .figures import draw_search
-
         return shown(partial(draw_search, self.tree), axes)
 
     def _check_plot(self, instead: str) -> None:
+        """Refuse to plot the model that lacks what a criticism added."""
         if self.added:
             raise ValueError(
                 f"the plot would be of the model without {', '.join(self.added)}; use "

@@ -1,14 +1,14 @@
-"""Stirred recordings as experiments that the engine can criticise."""
+"""Stirred recordings as experiments that the engine can criticise, and the noise in them."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import Argument, InputError
+from ..errors import InputError
 from ..inputs.fields import PLANE_NAMES
-from ..inputs.recording import Recording
+from ..inputs.recording import Recording, planned_recording
 from ..inputs.strokes import resting, speed, strokes
 from ..simulators import StirSimulator
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         Extension,
         ModelError,
         Noise,
+        Proposal,
         Window,
     )
 
@@ -37,6 +38,21 @@ RATE_TOLERANCE = 0.02
 
 SPEED_BINS = 3
 """Stretches of like speed that a stir is cut into, beside its strokes."""
+
+FASTER_FACTOR, SLOWER_FACTOR = 1.6, 0.5
+"""Speeds of proposed stirs, relative to the recording's."""
+
+MAX_SPEED = 0.2
+"""Of a proposed stir [m/s]."""
+
+MAX_RADIUS_SHARE = 0.8
+"""Of the way from the axis to the wall that the stick may go."""
+
+DIFFERENCE_ORDER = 3
+"""Of the differences that leave the noise of a smooth signal."""
+
+DIFFERENCE_GAIN = np.sqrt(20.0)
+"""Of third differences on white noise: sqrt(binomial(6, 3))."""
 
 
 def camera_noise(recordings: Sequence[Recording]) -> "AutoregressiveNoise":
@@ -92,12 +108,58 @@ def stir_experiment(
     label: str,
 ) -> "Experiment":
     """Recordings of one liquid, with the cameras' noise and the simulator's usual residual."""
-    from ..inference.criticism import Experiment, SumOfNoises
+    from ..inference.criticism import Experiment
 
-    noise: Noise = cameras if usual is None else SumOfNoises((cameras, usual))
     return Experiment(
-        stirring.batched, stirring.observed, noise, stirring.identity, label, windows(stirring)
+        stirring.batched,
+        stirring.observed,
+        _beside(cameras, usual),
+        stirring.identity,
+        label,
+        windows(stirring),
     )
+
+
+def stir_proposals(
+    stirring: StirSimulator, cameras: "AutoregressiveNoise", usual: "ModelError | None"
+) -> list["Proposal"]:
+    """The first recording's rig on other paths, seen with the same cameras' noise.
+
+    Args:
+        stirring: What was recorded.
+        cameras: Their noise.
+        usual: The simulator's usual residual on other paths, if it is known.
+    """
+    from ..hardware.motion import circle, star
+    from ..inference.criticism import Proposal
+
+    recording, setup = stirring.recordings[0], stirring.setups[0]
+    fast = float(np.quantile(speed(recording), 0.95))
+    faster, slower = min(FASTER_FACTOR * fast, MAX_SPEED), SLOWER_FACTOR * fast
+    position, height = recording.gripper.position[:, :2], float(recording.gripper.position[0, 2])
+    most = MAX_RADIUS_SHARE * (setup.cup.radius - setup.stick.radius)
+    radius = min(max(float(np.linalg.norm(position, axis=1).max()), 0.01), most)
+    at: dict[str, Any] = {"height": height, "radius": radius}
+    near = at | {"radius": 0.8 * radius}
+    paths = {
+        f"the star at {100 * faster:.0f} cm/s": star(speed=faster, **at),
+        f"the star at {100 * slower:.0f} cm/s": star(speed=slower, **at),
+        f"a star of 7 points at {100 * fast:.0f} cm/s": star(speed=fast, points=7, **near),
+        f"four circles at {100 * fast:.0f} cm/s": circle(speed=fast, **near),
+    }
+    noise, made = _beside(cameras, usual), []
+    for label, path in paths.items():
+        plan = planned_recording(path.time, path.position, recording.attrs)
+        own, shape = StirSimulator((plan,), (setup,)), (len(path.time), len(PLANE_NAMES))
+        made.append(Proposal(own.batched, noise, shape, own.identity, label))
+    return made
+
+
+def _beside(cameras: "AutoregressiveNoise", usual: "ModelError | None") -> "Noise":
+    """The cameras' noise and, where it is known, the simulator's usual residual."""
+    from ..inference.criticism import SumOfNoises
+
+    return cameras if usual is None else SumOfNoises((cameras, usual))
 
 
 def windows(stirring: StirSimulator) -> tuple["Window", ...]:
@@ -141,11 +203,7 @@ def _speeds(recording: Recording) -> Iterator[tuple[str, NDArray[np.bool_]]]:
 
 
 def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Extension"]:
-    """The registered effects that act in a scene, "stir" or "pour".
-
-    Raises:
-        InputError: A name that is not registered.
-    """
+    """The registered effects that act in a scene, "stir" or "pour"; of the named ones only."""
     from ..inference.criticism import Extension
     from ..models import EFFECTS
 
@@ -156,25 +214,11 @@ def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Ext
 
 
 def names_of_effects(scene: str, names: Sequence[str] | None = None) -> list[str]:
-    """Those of `effects_of`, without loading the engine.
-
-    Raises:
-        InputError: A name that is not registered.
-    """
+    """Those of `effects_of`, without loading the engine."""
     from ..models import EFFECTS
 
-    unknown = [name for name in names or () if name not in EFFECTS]
-    if unknown:
-        raise InputError(
-            f"there is no effect {', '.join(map(str, unknown))}",
-            where=Argument("effects"),
-            fix=f"choose from {', '.join(EFFECTS)}",
-        )
-    return [
-        name
-        for name, effect in EFFECTS.items()
-        if scene in effect.scenes and (names is None or name in names)
-    ]
+    considered = EFFECTS if names is None else names
+    return [name for name, one in EFFECTS.items() if scene in one.scenes and name in considered]
 
 
 def same_rate(one: Recording, other: Recording) -> bool:
@@ -195,3 +239,51 @@ def same_experiment(one: Recording, other: Recording) -> bool:
     apart = np.abs(one.gripper.position - other.gripper.position).max()
     late = np.abs((one.time - one.time[0]) - (other.time - other.time[0])).max()
     return bool(apart < PATH_TOLERANCE and late < TIME_TOLERANCE)
+
+
+def rms(values: NDArray) -> float:
+    """Root mean square of the values that are not NaN."""
+    return float(np.sqrt(np.nanmean(np.square(values))))
+
+
+def sensor_noise(inclination: NDArray) -> float:
+    """Standard deviation of white noise in a smooth signal.
+
+    Third differences remove whatever is locally quadratic and leave the noise, times a known
+    gain (von Neumann et al. 1941, with differences of a higher order). On the bundled
+    recordings this finds their 0.10 degrees within 1 %.
+
+    Args:
+        inclination: Samples of one recording, shape (T, planes), NaN where missing.
+
+    Returns:
+        Standard deviation in the signal's unit, over all planes; 0 where no four neighbouring
+        samples were seen.
+    """
+    differences = np.diff(inclination, DIFFERENCE_ORDER, axis=0)
+    return rms(differences) / float(DIFFERENCE_GAIN) if np.isfinite(differences).any() else 0.0
+
+
+def replicate_noise(replicates: NDArray) -> float:
+    """Expected RMS difference between two simulations that differ by their seeds only.
+
+    Args:
+        replicates: Signals, shape (seeds, ...), at least two seeds.
+
+    Returns:
+        RMS in the signal's unit: the square root of twice the variance between seeds, as the
+        liquid in the cup has an initial packing of its own, too.
+    """
+    return float(np.sqrt(2.0 * np.mean(np.var(replicates, axis=0, ddof=1))))
+
+
+def irreducible_rms(recordings_inclination: list[NDArray], replicates: NDArray) -> float:
+    """RMS that the right model at the right parameters would leave: both noises in quadrature.
+
+    Args:
+        recordings_inclination: Observed samples of each recording, shapes (T, planes).
+        replicates: Simulated signals of all recordings joined along time, (seeds, T, planes).
+    """
+    weights = [np.isfinite(seen).sum() for seen in recordings_inclination]
+    variance = np.average([sensor_noise(y) ** 2 for y in recordings_inclination], weights=weights)
+    return float(np.sqrt(variance + replicate_noise(replicates) ** 2))

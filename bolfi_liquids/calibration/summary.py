@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from pydantic import computed_field
@@ -15,15 +15,14 @@ from ..inputs.frame import named_faults
 from ..models import stirring_error
 from ..run.summary import Number, Section
 from ..simulators import StirSimulator
-from ..wording import with_unit
-from .engine_fit import PosteriorCheck
-from .model_error import ModelError
-from .noise import irreducible_rms, rms
+from ..wording import degrees, with_unit
+from .stirs import irreducible_rms, rms
 
 if TYPE_CHECKING:
     from xarray import DataArray, Dataset, DataTree
 
     from ..inference import Fit
+    from ..inference.criticism import ModelError
 
 QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
 RHAT_MAX, ESS_MIN = 1.01, 400.0  # Vehtari et al. 2021
@@ -98,13 +97,6 @@ class Seconds:
     sampling: Number
 
 
-class Fitted(NamedTuple):
-    """How near a model comes to the recordings, and how near the right one would [deg], RMS."""
-
-    rms_deg: float
-    noise_deg: float
-
-
 @dataclass(frozen=True)
 class CalibrationSummary(Section):
     """Numbers of a calibration.
@@ -163,56 +155,56 @@ class CalibrationSummary(Section):
         tree: "DataTree",
         fit: "Fit",
         stirring: StirSimulator,
-        check: PosteriorCheck,
-        error: ModelError | None,
         budget: int,
+        error: "ModelError | None",
+        clean: tuple[str, ...],
     ) -> Self:
-        """From posterior.nc, the engine's fit, what was stirred, the simulations that check, the
-        error that the fit allows for, and the number of simulations of the search."""
-        posterior, closest = tree["posterior"], check.closest
+        """From posterior.nc and the engine's fit.
+
+        Args:
+            tree: posterior.nc.
+            fit: Of the engine.
+            stirring: What was simulated.
+            budget: Simulations of the search.
+            error: Of the simulator, for which the fit allows; None where it allows for none.
+            clean: Names of the recordings from which that was learned.
+        """
+        posterior, closest = tree["posterior"].to_dataset(), tree["closest"].to_dataset()
+        replicates = tree["replicates"]["inclination"].to_numpy()
         seen = [one.inclination for one in stirring.recordings]
+        misfit = stirring.observed - closest["inclination"].to_numpy()
         spent = {name: tree.attrs[f"seconds_{name}"] for name in Seconds.__dataclass_fields__}
         return cls(
-            parameters={
-                str(name): ParameterSummary.of(draws) for name, draws in posterior.data_vars.items()
-            },
+            **_of_draws(posterior, stirring.least_viscosity),
             least_viscosity=float(stirring.least_viscosity),
-            below_least_viscosity=_below(posterior.to_dataset(), stirring.least_viscosity),
             best=fit.best,
-            closest=closest.theta,
+            closest={name: float(closest[name]) for name in fit.prior.names},
             n_simulations=budget,
-            n_check_simulations=len(fit.history.theta) - budget + len(check.replicates),
-            fit_rms_deg=float(np.degrees(rms(stirring.observed - closest.signal))),
-            noise_deg=float(np.degrees(irreducible_rms(seen, check.replicates))),
-            **_sampling(posterior.to_dataset()),
+            n_check_simulations=len(fit.history.theta) - budget + len(replicates),
+            fit_rms_deg=float(np.degrees(rms(misfit))),
+            noise_deg=float(np.degrees(irreducible_rms(seen, replicates))),
             emulator_warnings=tuple(fit.warnings),
             seconds=Seconds(**{name: float(value) for name, value in spent.items()}),
             seed=int(tree.attrs["seed"]),
             version=version("bolfi-liquids"),
             frame_faults=named_faults(stirring.recordings),
-            model_error_deg=0.0 if error is None else float(np.degrees(error.rms)),
-            clean=() if error is None else error.clean,
+            model_error_deg=float(
+                np.degrees(0.0 if error is None else np.sqrt(error.autocovariance[0]))
+            ),
+            clean=clean,
             confirmed=bool(fit.confirmed),
         )
 
-    def of_posterior(
-        self,
-        posterior: "Dataset",
-        parameters: Mapping[str, ParameterSummary],
-        best: Mapping[str, float],
-        fit: Fitted,
-    ) -> Self:
-        """These numbers with those of another posterior, in which effects were added."""
-        return replace(
-            self,
-            fit_rms_deg=fit.rms_deg,
-            noise_deg=fit.noise_deg,
-            parameters=parameters,
-            best=best,
-            frame_faults=() if TURNING_EFFECT in parameters else self.frame_faults,
-            below_least_viscosity=_below(posterior, self.least_viscosity),
-            **_sampling(posterior),
-        )
+    def extended(self, posterior: "Dataset", **changed: Any) -> Self:
+        """These numbers with those of another posterior, in which effects were added.
+
+        Args:
+            posterior: Variables of shape (chain, draw).
+            changed: Fields that these draws do not decide.
+        """
+        fields = _of_draws(posterior, self.least_viscosity) | changed
+        faults = () if TURNING_EFFECT in fields["parameters"] else self.frame_faults
+        return replace(self, frame_faults=faults, **fields)
 
     @computed_field
     @property
@@ -267,12 +259,14 @@ def bad_fit(summary: CalibrationSummary) -> str | None:
         return None
     if summary.frame_faults:
         return f"{'; '.join(summary.frame_faults)}. Do not rely on the posterior."
+    misfit, error, noise = map(
+        degrees, (summary.fit_rms_deg, summary.simulator_error_deg, summary.noise_deg)
+    )
     return (
-        f"The fit is bad: {summary.fit_rms_deg:.2f}° RMS, of which the simulator's own error is "
-        f"about {summary.simulator_error_deg:.2f}°; the rest is {summary.fit_to_noise:.1f} times "
-        f"the noise of {summary.noise_deg:.2f}°. A sign, the direction of the axes, the clock, a "
-        "size or a density is likely wrong, too little was simulated, or the simulator lacks an "
-        "effect. Do not rely on the posterior."
+        f"The fit is bad: {misfit} RMS, of which the simulator's own error is about {error}; the "
+        f"rest is {summary.fit_to_noise:.1f} times the noise of {noise}. A sign, the direction of "
+        "the axes, the clock, a size or a density is likely wrong, too little was simulated, or "
+        "the simulator lacks an effect. Do not rely on the posterior."
     )
 
 
@@ -287,15 +281,12 @@ def unexplained(misfit: float, error: float) -> float:
     return float(np.sqrt(np.maximum(misfit**2 - error**2, 0.0)))
 
 
-def _below(posterior: "Dataset", viscosity: float) -> float:
-    """Share of the draws below a viscosity [Pa s]."""
-    return float((posterior["viscosity"].to_numpy() < viscosity).mean())
-
-
-def _sampling(posterior: "Dataset") -> dict[str, Any]:
-    """What the sampler tells of its draws, as fields of `CalibrationSummary`."""
-    attrs = posterior.attrs
+def _of_draws(posterior: "Dataset", least_viscosity: float) -> dict[str, Any]:
+    """The fields of `CalibrationSummary` that draws of shape (chain, draw) decide."""
+    attrs, draws = posterior.attrs, posterior.items()
     return {
+        "parameters": {str(name): ParameterSummary.of(values) for name, values in draws},
+        "below_least_viscosity": float((posterior["viscosity"] < least_viscosity).mean()),
         "rhat_max": float(attrs["rhat_max"]),
         "ess_min": float(min(attrs["ess_bulk_min"], attrs["ess_tail_min"])),
         "n_draws": int(posterior.sizes["chain"] * posterior.sizes["draw"]),

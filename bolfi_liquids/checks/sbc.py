@@ -140,7 +140,7 @@ class SbcStudy:
         pipeline: Any = Calibrate(self.stirring, self.prior, calibration, self.compute.timeout)
         if name == "signal":
             # an error of the simulator is observed, and allowed for, as `calibrate` does
-            noise = SumOfNoises((noise, model_error(self.stirring, 0.0).usual))
+            noise = SumOfNoises((noise, model_error(self.stirring, 0.0)))
             shared = self.stirs_everywhere()
             pipeline = FromBank(self.stirring, self.prior, *shared, calibration, noise)
         return inference.replicates(

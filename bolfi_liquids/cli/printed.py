@@ -84,7 +84,8 @@ def print_findings(criticism: "Criticism") -> None:
 
     facts = criticism_facts(criticism)
     of_what_there_is = {"where": "where", "poured": "pours", "next": "suggestions"}
-    parts = ("verdict", "baseline", "criticism", "gap", "where", "detectable", "poured", "next")
+    parts = ("verdict", "noise", "baseline", "criticism", "gap", "where", "detectable")
+    parts = (*parts, "poured", "next")
     told = [part for part in parts if part not in of_what_there_is or facts[of_what_there_is[part]]]
     _print_prose(told, {"criticism": facts})
 

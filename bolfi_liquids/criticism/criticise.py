@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from ..calibration.model_error import Clean, clean_residuals, usual_for
 from ..calibration.result import Calibration
-from ..calibration.stirs import effects_of, held_out_noise, stir_experiment
+from ..calibration.stirs import (
+    effects_of,
+    held_out_noise,
+    stir_experiment,
+    stir_proposals,
+)
 from ..errors import Argument, InputError
 from ..inputs.frame import recording_warnings
 from ..inputs.open import Source, open_recordings
@@ -20,17 +25,16 @@ from ..progress import phases
 from ..run.compute import open_compute
 from ..run.given_pours import keep_pours
 from ..run.run import Run, RunOrPath
-from ..simulators import stir_simulator
-from .criticism_file import Sources, criticism_tree
-from .inputs import Inputs, check_effects, open_inputs
-from .pours import as_prior, pour_experiment
-from .proposals import pour_proposals, stir_proposals
+from ..simulators import StirSimulator, stir_simulator
+from .criticism_file import criticism_tree
+from .inputs import Inputs, open_inputs
+from .pours import as_prior, pour_experiment, pour_proposals
 from .result import Criticism
 from .summary import CriticismSummary
 
 if TYPE_CHECKING:
     from .. import inference
-    from ..inference.criticism import Report
+    from ..inference.criticism import AutoregressiveNoise, Report
     from ..inference.simulations import Compute, Workers
     from ..models import Cups
 
@@ -85,7 +89,6 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     # their rules make them tuples
     named: dict[str, Any] = {"effects": effects, "accept": accept}
     settings = CriticismSettings(**named, seed=seed, batch=batch)
-    check_effects(settings)
     kept_back = open_recordings(held_out, Argument("held_out"))
     clean = open_recordings(baseline, Argument("baseline"))
     with Run.entered(calibration) as run:
@@ -104,25 +107,21 @@ def criticise(  # noqa: PLR0913  the one call that most users make
                 return finished
             with run.bank() as bank, phases(shown=progress) as report:
                 own = replace(compute, batch=settings.batch, bank=bank)
-                sources, clean_runs = _find(base, inputs, own, report)
-                tree = criticism_tree(inputs, sources)
+                found, clean_runs = _find(base, inputs, own, report)
+                tree = criticism_tree(inputs, found)
         seconds = time.perf_counter() - started
-        summary = CriticismSummary.of(inputs, sources, clean_runs, tree, seconds)
+        summary = CriticismSummary.of(inputs, found, clean_runs, tree, seconds)
         run.keep("criticise", tree, inputs.made_from, summary.to_json())
         return Criticism.made(base, tree)
 
 
 def _find(
     calibration: Calibration, inputs: Inputs, compute: "Compute", report: "Report"
-) -> tuple[Sources, int]:
+) -> "tuple[dict[str, inference.criticism.Criticism], int]":
     """What the engine concludes, and how often it simulated clean recordings before."""
+    particles = inputs.stirring.setups[0].particles
     clean = clean_residuals(
-        inputs.baseline,
-        inputs.stirring.setups[0].particles,
-        calibration.prior,
-        effects_of("stir"),
-        compute=compute,
-        report=report,
+        inputs.baseline, particles, calibration.prior, compute=compute, report=report
     )
     how: dict[str, Any] = {
         "executor": compute.executor,
@@ -132,38 +131,39 @@ def _find(
         "seed": inputs.settings.seed,
         "level": inputs.level,
     }
-    sources = Sources(_stirs(calibration, inputs, clean, how | {"report": report}))
+    found = {"stirs": _stirs(calibration, inputs, clean, how | {"report": report})}
     if inputs.table is not None:
         how["report"] = lambda phase, n: report(f"pours, {phase}", n)
-        pours = _pours(calibration.prior, sources.stirs, inputs, inputs.table, how)
-        sources = Sources(sources.stirs, pours)
-    return sources, sum(one.simulations for one in clean)
+        found["pours"] = _pours(calibration.prior, found["stirs"], inputs, inputs.table, how)
+    return found, sum(one.simulations for one in clean)
 
 
 def _stirs(
     calibration: Calibration, inputs: Inputs, clean: Sequence[Clean], how: Mapping[str, Any]
 ) -> "inference.criticism.Criticism":
+    """The engine's criticism of the stirs."""
     from .. import inference
 
     stirring, settings, cameras = inputs.stirring, inputs.settings, inputs.cameras
     extensions = effects_of("stir", settings.effects)
     viscosity = calibration.summary.best.get("viscosity")
 
+    def experiment(own: StirSimulator, noise: "AutoregressiveNoise", label: str):
+        return stir_experiment(own, noise, usual_for(own, clean, viscosity), label)
+
     def held_out(recording: Recording) -> "inference.criticism.Experiment":
         own = stir_simulator([recording], stirring.setups[0].particles)
         noise = held_out_noise(recording, stirring.recordings)
-        usual = usual_for(own, clean, viscosity)
-        return stir_experiment(own, noise, usual, recording.path.name)
+        return experiment(own, noise, recording.path.name)
 
+    elsewhere = usual_for(stirring, clean, viscosity, elsewhere=True)
     return inference.criticism.criticise(
-        stir_experiment(stirring, cameras, usual_for(stirring, clean, viscosity), "stir"),
+        experiment(stirring, cameras, "stir"),
         calibration.prior,
         extensions,
-        earlier=_learned_from(calibration),
+        earlier=calibration.learned_from,
         held_out=[held_out(one) for one in inputs.held_out],
-        proposals=stir_proposals(
-            stirring, cameras, usual_for(stirring, clean, viscosity, elsewhere=True)
-        ),
+        proposals=stir_proposals(stirring, cameras, elsewhere),
         accept=_among(settings.accept, extensions),
         plan=settings.stir_plan,
         **how,
@@ -193,7 +193,7 @@ def _pours(
         )
     taught = as_prior(stirs.posterior.theta, stirs.posterior.weights, known.fit.prior)
     names = (*prior.names, *poured_too)
-    held_out = [] if inputs.held_out_table is None else [inputs.held_out_table]
+    held_out = [one for one in (inputs.held_out_table,) if one is not None]
     return inference.criticism.criticise(
         pour_experiment(table, cups, density),
         inference.Prior({name: taught.distributions[name] for name in names}),
@@ -206,15 +206,7 @@ def _pours(
     )
 
 
-def _among(accept: Sequence[str] | None, extensions: dict) -> list[str] | None:
+def _among(accept: Sequence[str] | None, extensions: Mapping[str, Any]) -> list[str] | None:
     """Of the effects to accept, those that can act here; None leaves it to the verdict."""
     here = [name for name in accept or () if name in extensions]
     return here or None
-
-
-def _learned_from(calibration: Calibration):
-    """The simulations that the calibration learned from: theta, signals, seeds."""
-    made = calibration.tree["simulations"].to_dataset()
-    good = ~made["failed"].to_numpy()
-    theta = {name: made[name].to_numpy()[good] for name in calibration.prior.names}
-    return theta, made["signal"].to_numpy()[good], made["seed"].to_numpy()[good]

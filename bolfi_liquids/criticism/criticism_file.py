@@ -14,36 +14,29 @@ Its groups, under `stirs` and, where pours were given, under `pours`:
 `posterior` holds the draws of the extended model, or of the base model where there is none.
 """
 
+from collections.abc import Mapping
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..inputs.fields import PLANE_NAMES
-from ..inputs.pour_table import PourTable
-from ..simulators import StirSimulator
-from .inputs import Inputs
 from .pours import OUTCOMES
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
     from .. import inference
+    from .inputs import Inputs
+
+    Sources = Mapping[str, inference.criticism.Criticism]
+    """What the engine concluded on "stirs" and, where some were given, on "pours"."""
 
 ANGLE, DIMENSIONLESS = {"units": "rad"}, {"units": "1"}
 
-
-class Sources(NamedTuple):
-    """What the engine concluded on stirs and, where some were given, on pours."""
-
-    stirs: "inference.criticism.Criticism"
-    pours: "inference.criticism.Criticism | None" = None
-
-    @property
-    def given(self) -> "list[inference.criticism.Criticism]":
-        """Those that there are."""
-        return [source for source in self if source is not None]
+LABELS: dict[type, Any] = {str: "", int: -1, float: float("nan")}
+"""Value of a label that a window does not have."""
 
 
 class EffectStatus(StrEnum):
@@ -60,18 +53,15 @@ class EffectStatus(StrEnum):
     FAILED = "untested: its simulations failed"
 
 
-def criticism_tree(inputs: Inputs, sources: Sources) -> "DataTree":
+def criticism_tree(inputs: "Inputs", sources: "Sources") -> "DataTree":
     """Everything that a report shows."""
     from xarray import DataTree
 
     groups = {"posterior": DataTree(_posterior(sources, inputs.settings.seed))}
-    residual = _stirs_residual(inputs.stirring, sources.stirs)
-    groups["stirs"] = _of_source(sources.stirs, residual, ANGLE)
-    if sources.pours is not None and inputs.table is not None:
-        residual = _pours_residual(inputs.table, sources.pours)
-        groups["pours"] = _of_source(sources.pours, residual, DIMENSIONLESS)
+    for name, source in sources.items():
+        groups[name] = DataTree.from_dict(_groups(inputs, name, source))
     tree = DataTree(children=groups)
-    accepted = [name for source in sources.given for name in source.accepted]
+    accepted = [name for source in sources.values() for name in source.accepted]
     tree.attrs.update(
         accepted=accepted,
         requested=[name for name in accepted if name in (inputs.settings.accept or ())],
@@ -80,41 +70,62 @@ def criticism_tree(inputs: Inputs, sources: Sources) -> "DataTree":
     return tree
 
 
-def _of_source(
-    source: "inference.criticism.Criticism", residual: "Dataset", units: dict[str, str]
-) -> "DataTree":
-    """The groups of stirs or of pours, whose data have these units."""
-    from xarray import DataTree
+def _groups(
+    inputs: "Inputs", name: str, source: "inference.criticism.Criticism"
+) -> "dict[str, Dataset]":
+    """The groups of "stirs" or "pours"."""
+    from xarray import Dataset
 
+    if name == "pours" and (table := inputs.table) is not None:
+        dims, units = ("outcome", "pour"), DIMENSIONLESS
+        coords = {
+            "angular_velocity": ("pour", table.angular_velocity, {"units": "rad s-1"}),
+            "distance": ("pour", table.distance, {"units": "m"}),
+            "outcome": list(OUTCOMES),
+        }
+    else:
+        dims, units = ("frame", "plane"), ANGLE
+        coords = {
+            "time": ("frame", inputs.stirring.time, {"units": "s"}),
+            "recording": ("frame", inputs.stirring.member),
+            "plane": list(PLANE_NAMES),
+        }
+    names = list(source.base.signatures)
+    cosine = {"cosine": (("effect", "other"), source.confusion)}
     groups = {
-        "residual": residual,
+        "residual": _residual(source, dims, units).assign_coords(coords),
         "where": _where(source, units),
         "effects": _effects(source),
-        "confusion": _confusion(source),
+        "confusion": Dataset(cosine, coords={"effect": names, "other": names}),
     }
     if source.gaps:
         groups["held_out"] = _held_out(source, units)
     if source.suggestions:
-        groups["suggestions"] = _suggestions(source)
-    return DataTree.from_dict(groups)
+        columns = {
+            "snr": ("experiment", [one.snr for one in source.suggestions]),
+            "between": ("experiment", [" or ".join(one.between) for one in source.suggestions]),
+        }
+        labels = [one.label for one in source.suggestions]
+        groups["suggestions"] = Dataset(columns, coords={"experiment": labels})
+    return groups
 
 
-def last_models(sources: Sources) -> "list[inference.criticism.Hypothesis]":
+def last_models(sources: "Sources") -> "list[inference.criticism.Hypothesis]":
     """The models that have all parameters: the pours' extended one, where there is one, and the
     stirs' last one, unless the pours' has all of its effects."""
-    stirs = sources.stirs.extended or sources.stirs.base.hypothesis
-    last = sources.pours and sources.pours.extended
+    stirs = sources["stirs"].extended or sources["stirs"].base.hypothesis
+    last = sources["pours"].extended if "pours" in sources else None
     if last is None:
         return [stirs]
     return [last] if set(stirs.names) <= set(last.fit.prior.names) else [last, stirs]
 
 
-def best_of(sources: Sources) -> dict[str, float]:
+def best_of(sources: "Sources") -> dict[str, float]:
     """The most probable parameters and coefficients of these models."""
     return {k: v for model in last_models(sources)[::-1] for k, v in model.best.items()}
 
 
-def _posterior(sources: Sources, seed: int) -> "Dataset":
+def _posterior(sources: "Sources", seed: int) -> "Dataset":
     """Draws of all parameters; coefficients that act in stirs alone are those of the stirs."""
     known, *others = (
         model.fit.sample("nuts", chains=4, draws=1000, seed=seed)["posterior"].to_dataset()
@@ -125,24 +136,6 @@ def _posterior(sources: Sources, seed: int) -> "Dataset":
     return known
 
 
-def _stirs_residual(stirring: StirSimulator, source: "inference.criticism.Criticism") -> "Dataset":
-    coords = {
-        "time": ("frame", stirring.time, {"units": "s"}),
-        "recording": ("frame", stirring.member),
-        "plane": list(PLANE_NAMES),
-    }
-    return _residual(source, ("frame", "plane"), ANGLE).assign_coords(coords)
-
-
-def _pours_residual(table: PourTable, source: "inference.criticism.Criticism") -> "Dataset":
-    coords = {
-        "angular_velocity": ("pour", table.angular_velocity, {"units": "rad s-1"}),
-        "distance": ("pour", table.distance, {"units": "m"}),
-        "outcome": list(OUTCOMES),
-    }
-    return _residual(source, ("outcome", "pour"), DIMENSIONLESS).assign_coords(coords)
-
-
 def _residual(
     source: "inference.criticism.Criticism", dims: tuple[str, str], units: dict[str, str]
 ) -> "Dataset":
@@ -151,16 +144,12 @@ def _residual(
     columns = {"observed": source.experiment.observed}
     for when, model in {"before": source.base.hypothesis, "after": source.extended}.items():
         if model is not None:
-            left, sd = _left(model)
-            columns |= {f"expected_{when}": source.experiment.observed - left, f"sd_{when}": sd}
+            # the usual model error counts as expected
+            sd = np.sqrt(np.diag(model.spread + model.noise))
+            whole = (model.surrogate.output.restore(of[None])[0] for of in (model.difference, sd))
+            left, columns[f"sd_{when}"] = whole
+            columns[f"expected_{when}"] = source.experiment.observed - left
     return Dataset({key: (dims, values, units) for key, values in columns.items()})
-
-
-def _left(hypothesis: "inference.criticism.Hypothesis") -> tuple[np.ndarray, np.ndarray]:
-    """Observed less expected, with the usual model error counted as expected, and its sd."""
-    output = hypothesis.surrogate.output
-    sd = np.sqrt(np.diag(hypothesis.spread + hypothesis.noise))
-    return output.restore(hypothesis.difference[None])[0], output.restore(sd[None])[0]
 
 
 def _where(source: "inference.criticism.Criticism", units: dict[str, str]) -> "Dataset":
@@ -168,7 +157,7 @@ def _where(source: "inference.criticism.Criticism", units: dict[str, str]) -> "D
 
     keys = {key: type(value) for found in source.before for key, value in found.label.items()}
     columns: dict[str, Any] = {
-        key: ("window", [found.label.get(key, _MISSING_LABEL[kind]) for found in source.before])
+        key: ("window", [found.label.get(key, LABELS[kind]) for found in source.before])
         for key, kind in keys.items()
     }
     for when, windows in (("before", source.before), ("after", source.after)):
@@ -177,9 +166,6 @@ def _where(source: "inference.criticism.Criticism", units: dict[str, str]) -> "D
                 values = [getattr(found, field) for found in windows]
                 columns[f"{field}_{when}"] = ("window", values, of)
     return Dataset(columns)
-
-
-_MISSING_LABEL: dict[type, Any] = {str: "", int: -1, float: float("nan")}
 
 
 def _effects(source: "inference.criticism.Criticism") -> "Dataset":
@@ -235,16 +221,6 @@ def _status(
     return EffectStatus.LESS_LIKELY
 
 
-def _confusion(source: "inference.criticism.Criticism") -> "Dataset":
-    from xarray import Dataset
-
-    names = list(source.base.signatures)
-    return Dataset(
-        {"cosine": (("effect", "other"), source.confusion)},
-        coords={"effect": names, "other": names},
-    )
-
-
 def _held_out(source: "inference.criticism.Criticism", units: dict[str, str]) -> "Dataset":
     from xarray import Dataset
 
@@ -261,15 +237,3 @@ def _held_out(source: "inference.criticism.Criticism", units: dict[str, str]) ->
     columns["holds"] = ("explanation", [source.holds(key) for key in source.gaps])
     labels = [gap.label for gap in gaps[0]]
     return Dataset(columns, coords={"explanation": names, "recording": labels})
-
-
-def _suggestions(source: "inference.criticism.Criticism") -> "Dataset":
-    from xarray import Dataset
-
-    return Dataset(
-        {
-            "snr": ("experiment", [one.snr for one in source.suggestions]),
-            "between": ("experiment", [" or ".join(one.between) for one in source.suggestions]),
-        },
-        coords={"experiment": [one.label for one in source.suggestions]},
-    )

@@ -1,21 +1,21 @@
 """What a criticism is given, read and checked."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..calibration.model_error import check_baseline, check_rig
+from ..calibration.model_error import check_beside
 from ..calibration.result import Calibration
 from ..calibration.stirs import camera_noise, names_of_effects
 from ..errors import Argument, InputError
 from ..inputs.pour_table import Pours, PourTable, check_scene, table_and_cups, table_of
 from ..inputs.recording import Recording
 from ..inputs.settings import FALSE_ALARM_RATE, CriticismSettings
-from ..simulators import StirSimulator, same_liquid, stir_simulator
+from ..simulators import StirSimulator, stir_simulator
 
 if TYPE_CHECKING:
     from ..inference.criticism import AutoregressiveNoise
@@ -71,12 +71,12 @@ class Inputs:
     @property
     def made_from(self) -> dict[str, Any]:
         """What a result was made from, as JSON: settings, and the SHA-256 of every file."""
-        groups = {
+        files = {
             "recordings": self.stirring.recordings,
             "held_out": self.held_out,
             "baseline": self.baseline,
-            "pours": () if self.table is None else (self.table,),
-            "held_out_pours": () if self.held_out_table is None else (self.held_out_table,),
+            "pours": [self.table],
+            "held_out_pours": [self.held_out_table],
         }
         made_from = {
             "after": self.after,
@@ -85,7 +85,8 @@ class Inputs:
             "settings": {k: v for k, v in asdict(self.settings).items() if k != "batch"},
             "considered": [names_of_effects(s, self.settings.effects) for s in ("stir", "pour")],
             **{
-                group: {one.path.name: one.hash for one in files} for group, files in groups.items()
+                group: {one.path.name: one.hash for one in some if one is not None}
+                for group, some in files.items()
             },
             "left_out": list(self.left_out),
             "poured": self.table and {"liquid": self.table.liquid, "cups": self.cups.settings()},
@@ -113,14 +114,15 @@ def open_inputs(
     """
     particles = int(calibration.record["settings"]["particles"])
     stirring = stir_simulator(calibration.run.recordings, particles)
-    _check_held_out(stirring, held_out)
+    check_beside(stirring, held_out, "held_out")
     used = {recording.hash for recording in (*stirring.recordings, *held_out)}
     clean = {recording.hash: recording for recording in baseline if recording.hash not in used}
     left_out = dict.fromkeys(one.path.name for one in baseline if one.hash in used)
-    check_baseline(stirring, tuple(clean.values()))
+    check_beside(stirring, list(clean.values()), "baseline")
     table, cups = table_and_cups(poured[0], cups)
     held_out_table = table_of(poured[1], Argument("held_out_pours"))
-    _check_pours(table, held_out_table, settings)
+    for where, what, fix in _faults(settings, table, held_out_table):
+        raise InputError(what, where=Argument(where), fix=fix)
     if held_out_table is not None:
         check_scene(held_out_table, cups)
     return Inputs(
@@ -136,73 +138,30 @@ def open_inputs(
     )
 
 
-def _check_held_out(stirring: StirSimulator, held_out: Sequence[Recording]) -> None:
-    fitted = {recording.hash for recording in stirring.recordings}
-    seen: set[str] = set()
-    for recording in held_out:
-        if {recording.hash, recording.path.name} & seen:
-            raise InputError(
-                "is held out twice, or has the name of another",
-                where=Argument(f"held_out {recording.path}"),
-                fix="give each recording once, and each a name of its own",
-            )
-        seen |= {recording.hash, recording.path.name}
-        if recording.hash in fitted:
-            raise InputError(
-                "is what the run was calibrated on",
-                where=Argument(f"held_out {recording.path}"),
-                fix="hold out another recording: nothing can be proved on data that were fitted",
-            )
-        if not same_liquid(recording, stirring.recordings[0]):
-            density = stirring.recordings[0].number("liquid_density")
-            raise InputError(
-                f"liquid_density is {recording.number('liquid_density'):g} kg/m3, but "
-                f"{density:g} in the run",
-                where=Argument(f"held_out {recording.path}"),
-                fix="hold out a recording of the same liquid",
-            )
-        check_rig(stirring, recording, Argument(f"held_out {recording.path}"))
+def _faults(
+    settings: CriticismSettings, table: PourTable | None, held_out: PourTable | None
+) -> Iterator[tuple[str, str, str]]:
+    """Arguments that cannot be used, why, and what to do about each."""
+    from ..models import EFFECTS
 
-
-def check_effects(settings: CriticismSettings) -> None:
-    """Raise `InputError` unless the effects to consider and to accept are there."""
-    both = (*names_of_effects("stir"), *names_of_effects("pour"))
-    considered = settings.effects or tuple(dict.fromkeys(both))
-    if not names_of_effects("stir", settings.effects):
-        raise InputError(
-            "none of the effects acts in a stir",
-            where=Argument("effects"),
-            fix=f"choose from {', '.join(names_of_effects('stir'))}",
-        )
+    stir, pour = names_of_effects("stir"), names_of_effects("pour")
+    considered = settings.effects or tuple(EFFECTS)
+    for name in considered:
+        if name not in EFFECTS:
+            yield "effects", f"there is no effect {name}", f"choose from {', '.join(EFFECTS)}"
+    if not set(considered) & set(stir):
+        yield "effects", "none of the effects acts in a stir", f"choose from {', '.join(stir)}"
     for name in settings.accept or ():
         if name not in considered:
-            raise InputError(
-                f"{name!r} is none of the effects that are considered",
-                where=Argument("accept"),
-                fix=f"choose from {', '.join(considered)}",
-            )
-
-
-def _check_pours(
-    table: PourTable | None, held_out: PourTable | None, settings: CriticismSettings
-) -> None:
-    if table is None:
-        if held_out is not None:
-            raise InputError(
-                "there are no pours to learn from",
-                where=Argument(f"held_out_pours {held_out.path}"),
-                fix="give some with `pours`",
-            )
-        return
-    if held_out is not None and held_out.hash == table.hash:
-        raise InputError(
-            "holds the pours that are fitted",
-            where=Argument(f"held_out_pours {held_out.path}"),
-            fix="hold out other pours: nothing can be proved on data that were fitted",
-        )
-    if not names_of_effects("pour", settings.effects):
-        raise InputError(
-            "none of the effects acts in a pour",
-            where=Argument("effects"),
-            fix=f"choose from {', '.join(names_of_effects('pour'))}, or give no `pours`",
-        )
+            what = f"{name!r} is none of the effects that are considered"
+            yield "accept", what, f"choose from {', '.join(considered)}"
+    if table is not None and not set(considered) & set(pour):
+        fix = f"choose from {', '.join(pour)}, or give no `pours`"
+        yield "effects", "none of the effects acts in a pour", fix
+    if held_out is not None:
+        where = f"held_out_pours {held_out.path}"
+        if table is None:
+            yield where, "there are no pours to learn from", "give some with `pours`"
+        elif held_out.hash == table.hash:
+            fix = "hold out other pours: nothing can be proved on data that were fitted"
+            yield where, "holds the pours that are fitted", fix

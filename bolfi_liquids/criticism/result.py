@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..calibration.result import Calibration
-from ..calibration.summary import Fitted
 from ..drawing import shown
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..run.run import Run, RunOrPath
 from ..wording import html_table, spoken
+from . import figures
 from .summary import CriticismSummary
 
 if TYPE_CHECKING:
@@ -100,51 +100,38 @@ class Criticism:
         """The extended calibration, with the accepted effects; the base one without."""
         if not self.summary.accepted:
             return self.base
+        gap, numbers = self.summary.gap, {}
+        # what is told of ties alone is of none that was accepted, and pours mend no stir
+        of_a_tie = self.summary.stirs.verdict is VerdictKind.TIE and not self.summary.requested
+        if gap.rms_after is not None and not of_a_tie:
+            numbers = {"fit_rms_deg": gap.rms_after, "noise_deg": gap.noise}
         tree = self.base.tree.copy()
         tree["posterior"] = self.tree["posterior"]
-        posterior = tree["posterior"].to_dataset()
-        summary = self.base.summary.of_posterior(
-            posterior, self.summary.parameters, self.summary.best, self._fitted
+        summary = self.base.summary.extended(
+            tree["posterior"].to_dataset(),
+            parameters=self.summary.parameters,
+            best=self.summary.best,
+            **numbers,
         )
         return replace(self.base, tree=tree, summary=summary)
 
-    @property
-    def _fitted(self) -> Fitted:
-        """How near the accepted effects bring the model to the stirs.
-
-        Effects that pours alone have shown bring it no nearer; what is told then is of ties.
-        """
-        gap, before = self.summary.gap, self.base.summary
-        of_a_tie = self.summary.stirs.verdict is VerdictKind.TIE and not self.summary.requested
-        if gap.rms_after is None or of_a_tie:
-            return Fitted(before.fit_rms_deg, before.noise_deg)
-        return Fitted(gap.rms_after, gap.noise)
-
     def plot_residuals(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Observed less expected against time, before and after, strokes that differ marked."""
-        from .figures import residual_plot
-
-        return shown(partial(residual_plot, self.tree.children["stirs"]), axes)
+        return shown(partial(figures.residual_plot, self._of("stirs")), axes)
 
     def plot_strokes(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Size of the difference by stroke, plane and speed, before and after."""
-        from .figures import stroke_plot
-
-        return shown(partial(stroke_plot, self.tree.children["stirs"]), axes)
+        return shown(partial(figures.stroke_plot, self._of("stirs")), axes)
 
     def plot_scores(self, source: str = "stirs", axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """How well each effect alone would explain the difference."""
-        from .figures import score_plot
-
-        return shown(partial(score_plot, self.tree.children[source]), axes)
+        return shown(partial(figures.score_plot, self._of(source)), axes)
 
     def plot_confusion(
         self, source: str = "stirs", axes: "ArrayLike | None" = None
     ) -> "NDArray[Any]":
         """Which effects these data cannot distinguish: cosines between their signatures."""
-        from .figures import confusion_plot
-
-        return shown(partial(confusion_plot, self.tree.children[source]), axes)
+        return shown(partial(figures.confusion_plot, self._of(source)), axes)
 
     def plot_coefficient(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Posterior of the accepted effects' coefficients.
@@ -152,11 +139,9 @@ class Criticism:
         Raises:
             ValueError: no effect was accepted.
         """
-        from .figures import coefficient_plot
-
         if not self.summary.accepted:
             raise ValueError("no effect was accepted, so there is no coefficient to plot")
-        return shown(partial(coefficient_plot, self.tree, self.summary.accepted), axes)
+        return shown(partial(figures.coefficient_plot, self.tree, self.summary.accepted), axes)
 
     def plot_held_out(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """RMS on recordings that were not fitted, before and after.
@@ -164,13 +149,7 @@ class Criticism:
         Raises:
             ValueError: nothing was tried on such recordings.
         """
-        from .figures import held_out_plot
-
-        if "held_out" not in self.tree["stirs"].children:
-            raise ValueError(
-                "no explanation was tested on held-out recordings; criticise the run with held_out"
-            )
-        return shown(partial(held_out_plot, self.tree.children["stirs"]), axes)
+        return shown(partial(figures.held_out_plot, self._of("stirs", "held_out")), axes)
 
     def plot_pours(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Observed against expected fractions of each pour, before and after.
@@ -178,11 +157,18 @@ class Criticism:
         Raises:
             ValueError: no pours were criticised.
         """
-        from .figures import pour_residual_plot
+        return shown(partial(figures.pour_residual_plot, self._of("pours")), axes)
 
-        if "pours" not in self.tree.children:
-            raise ValueError("no pours were criticised; criticise the run with pours")
-        return shown(partial(pour_residual_plot, self.tree.children["pours"]), axes)
+    def _of(self, source: str, group: str = "effects") -> "DataTree":
+        """The groups of "stirs" or "pours".
+
+        Raises:
+            ValueError: It was not criticised, or has no such group.
+        """
+        if f"/{source}/{group}" not in self.tree.groups:
+            option = group if group == "held_out" else source
+            raise ValueError(f"nothing was found on {option}; criticise the run with {option}")
+        return self.tree.children[source]
 
 
 def calibration_to_pour(run: Run) -> Calibration:

@@ -7,18 +7,19 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 import numpy as np
 from pydantic import Field
 
-from ..calibration.noise import rms
+from ..calibration.stirs import rms
 from ..calibration.summary import ParameterSummary
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..inputs.frame import named_faults
 from ..inputs.settings import FALSE_ALARM_RATE
 from ..run.summary import Number, Section
-from .criticism_file import Sources, best_of
+from .criticism_file import best_of
 
 if TYPE_CHECKING:
     from xarray import DataTree
 
     from .. import inference
+    from .criticism_file import Sources
     from .inputs import Inputs
 
 GRAVEST_FIRST = (VerdictKind.EFFECT, VerdictKind.TIE, VerdictKind.UNKNOWN)
@@ -149,7 +150,7 @@ class GapSummary:
         noise = rms(np.sqrt(np.diag(base.own) + np.diag(measured)))
         known = float(np.hypot(noise, data.model_error_rms))
         before, after = _rms(base), None if best is None else _rms(best.hypothesis)
-        numbers = {
+        numbers: dict[str, Any] = {
             "before": excess_rms(before, known),
             "after": None if after is None else excess_rms(after, known),
             "noise": noise,
@@ -157,20 +158,16 @@ class GapSummary:
             "rms_before": before,
             "rms_after": after,
         }
-        held_out = {
-            "before": [gap.unexplained[0] for gap in gaps],
-            "after": [gap.unexplained[1] for gap in gaps],
-            "noise": [gap.noise for gap in gaps],
-            "usual": [gap.model_error for gap in gaps],
-            "rms_before": [gap.before for gap in gaps],
-            "rms_after": [gap.after for gap in gaps],
-        }
+        held_out = [
+            (*gap.unexplained, gap.noise, gap.model_error, gap.before, gap.after) for gap in gaps
+        ]
+        columns = np.transpose(held_out) if held_out else [None] * len(numbers)
         numbers |= {
-            f"held_out_{name}": rms(np.array(of)) if of else None for name, of in held_out.items()
+            f"held_out_{name}": None if of is None else rms(of)
+            for name, of in zip(list(numbers), columns, strict=True)
         }
         in_degrees: dict[str, Any] = {
-            name: None if value is None else float(np.degrees(value))
-            for name, value in numbers.items()
+            name: None if of is None else float(np.degrees(of)) for name, of in numbers.items()
         }
         return cls(**in_degrees)
 
@@ -289,7 +286,7 @@ class CriticismSummary(Section):
 
     @classmethod
     def of(
-        cls, inputs: "Inputs", sources: Sources, clean: int, tree: "DataTree", seconds: float
+        cls, inputs: "Inputs", sources: "Sources", clean: int, tree: "DataTree", seconds: float
     ) -> Self:
         """From what was given and found.
 
@@ -300,7 +297,8 @@ class CriticismSummary(Section):
             tree: criticism.nc.
             seconds: Time that it took [s].
         """
-        posterior, given = tree["posterior"].to_dataset(), sources.given
+        posterior, given = tree["posterior"].to_dataset(), sources.values()
+        parameters = {str(name): ParameterSummary.of(of) for name, of in posterior.items()}
         verdicts = list(map(SourceVerdict.of, given))
         verdict, effects = _together(verdicts)
         accepted, requested = (tuple(tree.attrs[name]) for name in ("accepted", "requested"))
@@ -314,14 +312,14 @@ class CriticismSummary(Section):
             held_out=min(one.held_out for one in verdicts if one.verdict == verdict),
             reason=" ".join(source.verdict.reason for source in given),
             p_value=min(1.0, len(verdicts) * min(one.p_value for one in verdicts)),
-            where=significant_windows(sources.stirs),
-            coefficient={name: ParameterSummary.of(posterior[name]) for name in accepted},
-            parameters={str(name): ParameterSummary.of(of) for name, of in posterior.items()},
+            where=significant_windows(sources["stirs"]),
+            coefficient={name: parameters[name] for name in accepted},
+            parameters=parameters,
             best=best_of(sources),
             n_simulations=clean + sum(source.simulations for source in given),
-            gap=GapSummary.of(sources.stirs),
+            gap=GapSummary.of(sources["stirs"]),
             stirs=verdicts[0],
-            pours=sources.pours and PourVerdict.of(sources.pours),
+            pours=PourVerdict.of(sources["pours"]) if "pours" in sources else None,
             suggestions=tuple(
                 SuggestedExperiment(one.label, tuple(one.between), one.snr)
                 for source in given
@@ -350,12 +348,12 @@ class CriticismSummary(Section):
         return tuple(self.made_from["settings"]["effects"] or ())
 
 
-def unsupported(sources: Sources) -> tuple[str, ...]:
+def unsupported(sources: "Sources") -> tuple[str, ...]:
     """Accepted effects that do not explain the difference: the test rejects them, or held-out data
     do."""
     return tuple(
         name
-        for source in sources.given
+        for source in sources.values()
         if source.leading is not None and not source.leading.accepted
         for name in source.accepted
     )

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.noise import rms, sensor_noise
+from ..calibration.stirs import rms, sensor_noise
 from ..calibration.summary import BAD_FIT_RATIO, MIN_NOISE_DEG, unexplained
 from ..errors import InputError
 from ..inputs.frame import frame_faults

@@ -12,6 +12,7 @@ from ..robot.armed_session import Ask
 from ..robot.live_view import SessionView
 from ..robot.record import finished, prepare_stir, stir_session
 from ..robot.stir import StirPlan, follow_plan
+from ..wording import at_most, spilled
 from .online import OnlineCalibration, OnlineChoice, OnlinePhase
 from .plan import PartialRecording
 
@@ -120,8 +121,8 @@ def sentence(estimate: "OnlineEstimate") -> str:
     turn = np.degrees(estimate.action["angular_velocity"])
     return (
         f"stroke {estimate.strokes}: {parameters}; best pour {turn:.0f} deg/s at "
-        f"{100 * estimate.action['distance']:.1f} cm spills {estimate.expected_spillage:.1%}, "
-        f"95 % below {estimate.spillage_q95:.1%} ({estimate.simulations} simulations, "
+        f"{100 * estimate.action['distance']:.1f} cm spills {spilled(estimate.expected_spillage)}, "
+        f"{at_most(estimate.spillage_q95)} in 19 of 20 cases ({estimate.simulations} simulations, "
         f"{estimate.lag:.1f} s late)" + ("" if estimate.fits else f"; {BAD_FIT}")
     )
 

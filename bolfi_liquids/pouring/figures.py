@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ..drawing import BLUE, INK, ORANGE, Panels, hover, hover_points, new_figure, panels
 from ..seeds import Phase, generator
+from ..wording import spilled as spilled_text
 from .spillage import ACTION, RISK
 
 if TYPE_CHECKING:
@@ -113,7 +114,8 @@ def draw_map(axes: "Axes", x: NDArray, y: NDArray, percent: NDArray) -> "QuadCon
     some = tuple(slice(None, None, -(-len(axis) // HOVER_STEPS)) for axis in (x, y))
     turn, apart = (part.ravel() for part in np.meshgrid(x[some[0]], y[some[1]], indexing="ij"))
     shown = zip(turn, apart, percent[some].ravel(), strict=True)
-    hover_points(axes, turn, apart, [f"{a:.0f}°/s, {b:.1f} cm: {c:.2g} %" for a, b, c in shown])
+    texts = [f"{a:.0f}°/s, {b:.1f} cm: {spilled_text(c / 100.0)}" for a, b, c in shown]
+    hover_points(axes, turn, apart, texts)
     shades = axes.contourf(x, y, percent.T, levels=PERCENT_LEVELS, cmap="Greys", alpha=0.8)
     lines = axes.contour(x, y, percent.T, levels=PERCENT_LEVELS[1:4], colors=INK, linewidths=0.6)
     axes.clabel(lines, fmt="%g %%", fontsize=7.5)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..criticism.pour_noise import (
+from ..criticism.pours import (
     CORRELATION_LENGTH,
     SIMULATOR_ERROR_SD,
     action_coordinates,

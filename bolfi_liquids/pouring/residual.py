@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..criticism.pour_noise import REPEATABILITY_SD
+from ..criticism.pours import REPEATABILITY_SD
 
 LOG_PRIOR_SD = 1.0, 0.5, 0.5
 """Of the logs of the process's standard deviation and of its two lengths."""

@@ -5,7 +5,6 @@ A chapter is a dictionary: `calibration`, `criticism` and `pour` of what each co
 """
 
 import json
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from ..wording import (
     LEAST_SPILLED,
     LIQUID_UNITS,
     at_most,
+    degrees,
     percent,
     spilled,
     spoken,
@@ -31,7 +31,7 @@ from ..wording import (
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-    from xarray import Dataset, DataTree
+    from xarray import DataTree
 
 Facts = dict[str, Any]
 
@@ -61,6 +61,9 @@ MUCH_SPILLED = 0.05
 
 ACTION_ENDS = {"angular_velocity": ("slowest", "fastest"), "distance": ("nearest", "farthest")}
 """What an action at either end of the range of each quantity is called."""
+
+HELD_OUT_ANGLES = ("before", "after", "noise", "floor")
+"""RMS of what is compared on a held-out recording."""
 
 NONE = "–"
 """In a table, where there is no number."""
@@ -121,11 +124,11 @@ def fit_facts(summary: CalibrationSummary) -> Facts:
         "bad": bad_fit(summary),
         "fit": fit,
         "misfit": not near,
-        "rms": _degrees(summary.fit_rms_deg),
-        "noise": _degrees(summary.noise_deg),
+        "rms": degrees(summary.fit_rms_deg),
+        "noise": degrees(summary.noise_deg),
         "times_noise": f"{ratio:.1f}",
-        "error": _degrees(summary.simulator_error_deg),
-        "model_error": _degrees(summary.model_error_deg) if summary.model_error_deg else "",
+        "error": degrees(summary.simulator_error_deg),
+        "model_error": degrees(summary.model_error_deg) if summary.model_error_deg else "",
         "clean": summary.clean,
         "converged": summary.sampler_status is SamplerStatus.CONVERGED,
         "rhat": f"{summary.rhat_max:.3f}",
@@ -157,13 +160,13 @@ def _learned(values: ParameterSummary, prior: "NDArray[np.float64]") -> Facts:
 
 def criticism_facts(criticism: Criticism) -> Facts:
     """Of a criticism: the verdicts, what it accepted, and the rows of its tables."""
-    summary, tree = criticism.summary, criticism.tree
-    stirs = tree.children["stirs"]
-    effects = stirs["effects"].to_dataset()
-    snr, held = dict(_numbers(effects, "snr")), list(_held_out(held_out_of(stirs)))
+    summary, sources = criticism.summary, dict(criticism.tree.children)
+    del sources["posterior"]
+    effects, held = _rows(sources["stirs"], "effects"), _held_out(sources["stirs"])
+    snr = {one["effect"]: one["snr"] for one in effects if np.isfinite(one["snr"])}
     ranked = sorted(snr.items(), key=lambda item: -item[1])
-    gap, where = summary.gap, [_place(window) for window in summary.where[:MAX_LISTED]]
-    before = criticism.base.summary.parameters
+    where = [_place(window) for window in summary.where[:MAX_LISTED]]
+    gains = sorted((one for one in effects if one["gain"] > 0.0), key=lambda one: -one["gain"])
     return {
         **vars(summary),
         **verdict_facts(summary),
@@ -175,11 +178,14 @@ def criticism_facts(criticism: Criticism) -> Facts:
                 "now": summary.parameters[name].interval(name),
                 "before": was.interval(name),
             }
-            for name, was in before.items()
+            for name, was in criticism.base.summary.parameters.items()
             if summary.accepted
         ],
-        "gap": {name: _degrees(value) for name, value in vars(gap).items()},
-        "usual": bool(gap.usual),
+        "gap": {
+            name: "" if angle is None else degrees(angle)
+            for name, angle in vars(summary.gap).items()
+        },
+        "usual": bool(summary.gap.usual),
         "where": where,
         "more_where": len(summary.where) - len(where),
         "detectable": {
@@ -187,20 +193,23 @@ def criticism_facts(criticism: Criticism) -> Facts:
         },
         "undetectable": [name for name, ratio in snr.items() if ratio < DETECTABLE_SNR],
         "detectable_from": f"{DETECTABLE_SNR:.0f}",
-        "gains": _gains(effects),
+        "gains": [
+            {
+                "name": spoken(one["effect"]),
+                "gain": f"{one['gain']:.1f}",
+                "p": f"{one['p_value']:.2g}",
+            }
+            for one in gains[:MAX_LISTED]
+        ],
         "holds": {one["explanation"]: one["holds"] for one in held},
         "held_out": held,
-        "effects": {
-            name: list(_effects(tree.children[name]))
-            for name in ("stirs", "pours")
-            if name in tree.children
-        },
+        "effects": {name: _effects(source) for name, source in sources.items()},
         "suggestions": [
             vars(one) | {"snr": f"{one.snr:.1f}", "helps": one.snr >= DETECTABLE_SNR}
             for one in sorted(summary.suggestions, key=lambda one: -one.snr)
         ],
         "noise": {
-            "sd": _degrees(summary.noise.sd_deg),
+            "sd": degrees(summary.noise.sd_deg),
             "uncertainty": percent(summary.noise.sd_uncertainty),
             "correlation": f"{summary.noise.correlation:.2f}",
             "samples": summary.noise.samples,
@@ -254,72 +263,62 @@ def _place(window: DifferingWindow) -> Facts:
     """A window in which model and data differ."""
     ends = (window.start_s, window.stop_s)
     start, stop = (NONE if end is None else f"{end:.1f}" for end in ends)
-    numbers = {"rms": _degrees(window.rms_deg), "p": f"{window.p_value:.2g}"}
+    numbers = {"rms": degrees(window.rms_deg), "p": f"{window.p_value:.2g}"}
     return {**vars(window), **numbers, "start": start, "stop": stop}
 
 
-def _gains(effects: "Dataset") -> list[Facts]:
-    """The effects that alone explain most, best first."""
-    helpful = effects.where(effects["gain"] > 0.0, drop=True).sortby("gain", ascending=False)
-    columns = (helpful[name].to_numpy()[:MAX_LISTED] for name in ("effect", "gain", "p_value"))
+def _rows(source: "DataTree", group: str) -> list[dict[str, Any]]:
+    """Rows of a table, by the names of its columns; none where there is no such table."""
+    if group not in source.children:
+        return []
+    table: Any = source[group].to_dataset().to_dataframe().reset_index()
+    return table.to_dict("records")
+
+
+def _held_out(source: "DataTree") -> list[Facts]:
+    """Each explanation on each held-out recording."""
     return [
-        {"name": spoken(str(name)), "gain": f"{gain:.1f}", "p": f"{p:.2g}"}
-        for name, gain, p in zip(*columns, strict=True)
+        {
+            "explanation": spoken(one["explanation"]),
+            "recording": one["recording"],
+            **{key: degrees(np.degrees(one[key])) for key in HELD_OUT_ANGLES},
+            "p": f"{one['p_value']:.2g}",
+            "gain": f"{one['lpd_gain']:.1f}",
+            "holds": bool(one["holds"]),
+        }
+        for one in _rows(source, "held_out")
     ]
 
 
-def held_out_of(source: "DataTree") -> "Dataset | None":
-    """The group `held_out` of a source, where it has one."""
-    return source["held_out"].to_dataset() if "held_out" in source.children else None
-
-
-def _held_out(held: "Dataset | None") -> Iterator[Facts]:
-    """Each explanation on each held-out recording."""
-    if held is None:
-        return
-    for name in held["explanation"].to_numpy():
-        for recording in held["recording"].to_numpy():
-            gap = held.sel(explanation=name, recording=recording)
-            angles = {key: float(np.degrees(gap[key])) for key in HELD_OUT_ANGLES}
-            yield {
-                "explanation": spoken(str(name)),
-                "recording": str(recording),
-                **{key: _degrees(angle) for key, angle in angles.items()},
-                "p": f"{float(gap['p_value']):.2g}",
-                "gain": f"{float(gap['lpd_gain']):.1f}",
-                "holds": bool(gap["holds"]),
-            }
-
-
-HELD_OUT_ANGLES = ("before", "after", "noise", "floor")
-
-
-def _effects(source: "DataTree") -> Iterator[Facts]:
+def _effects(source: "DataTree") -> list[Facts]:
     """Each effect considered for a source."""
-    effects, confusion = (source[group].to_dataset() for group in ("effects", "confusion"))
-    for each in effects["effect"].to_numpy():
-        name, found = str(each), effects.sel(effect=each)
-        yield {
-            "name": spoken(name),
-            "typical": _number(found["typical"].item(), ".3g", unit_of(name)),
-            "snr": _number(found["snr"].item(), ".1f"),
-            "similar": _most_similar(name, confusion),
-            "gain": _number(found["gain"].item(), ".1f"),
-            "p": _number(found["p_value"].item(), ".2g"),
-            "coefficient": _number(found["coefficient"].item(), ".3g", unit_of(name)),
-            "status": str(found["status"].item()),
+    return [
+        {
+            "name": spoken(one["effect"]),
+            "typical": _number(one["typical"], ".3g", unit_of(one["effect"])),
+            "snr": _number(one["snr"], ".1f"),
+            "similar": _most_similar(one["effect"], source["confusion/cosine"]),
+            "gain": _number(one["gain"], ".1f"),
+            "p": _number(one["p_value"], ".2g"),
+            "coefficient": _number(one["coefficient"], ".3g", unit_of(one["effect"])),
+            "status": one["status"],
         }
+        for one in _rows(source, "effects")
+    ]
 
 
-def _most_similar(name: str, confusion: "Dataset") -> str:
-    """The other effect whose signature is most like an effect's, with their cosine."""
-    names = [str(other) for other in confusion["effect"].to_numpy()]
-    if name not in names or len(names) < 2:
+def _most_similar(name: str, cosine: Any) -> str:
+    """The other effect whose signature is most like an effect's, with their cosine.
+
+    Args:
+        name: Of the effect.
+        cosine: Between the signatures of all that were simulated, over (effect, other).
+    """
+    if name not in cosine["effect"] or cosine.sizes["other"] < 2:
         return NONE
-    cosine = confusion["cosine"].sel(effect=name).to_numpy()
-    others = np.where(np.array(names) == name, 0.0, np.abs(cosine))
-    closest = int(np.argmax(others))
-    return f"{spoken(names[closest])} ({cosine[closest]:.2f})"
+    others = cosine.sel(effect=name).drop_sel(other=name)
+    closest = others.isel(other=int(np.argmax(np.abs(others.to_numpy()))))
+    return f"{spoken(str(closest['other'].item()))} ({closest.item():.2f})"
 
 
 def pour_facts(pour: Pour) -> Facts:
@@ -407,21 +406,8 @@ def _ends(pour: "DataTree") -> list[str]:
     ]
 
 
-def _numbers(effects: "Dataset", column: str) -> Iterator[tuple[str, float]]:
-    """Effect and number of each row in which the number is known."""
-    names, values = effects["effect"].to_numpy(), effects[column].to_numpy()
-    for name, value in zip(names, values, strict=True):
-        if np.isfinite(value):
-            yield str(name), float(value)
-
-
 def _spoken(names: Any) -> list[str]:
     return [spoken(name) for name in names]
-
-
-def _degrees(value: float | None) -> str:
-    """An angle [deg]; "" where there is none."""
-    return "" if value is None else f"{value:.2f}°"
 
 
 def _number(value: float, form: str, unit: str = "") -> str:

@@ -6,7 +6,6 @@ name ends with a digest of what is simulated for it; a film that is there is not
 
 import base64
 import json
-from collections.abc import Iterator
 from contextlib import nullcontext
 from functools import partial
 from hashlib import sha256
@@ -15,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..files import write_whole
 from ..inputs.cups import kept_cups
@@ -99,26 +97,6 @@ class Film(NamedTuple):
             film.convert("RGB").save(picture, "WEBP", quality=85)
         return _url(picture.getvalue())
 
-    def pictures(self, timeout: float | None) -> Iterator[NDArray[np.uint8]] | None:
-        """Simulate it, and draw each frame; none if the simulation diverges.
-
-        Raises:
-            TimeoutError: The simulation took longer than the timeout.
-        """
-        from ..models import time_limit
-        from ..movie.pour import pour_pictures
-        from ..movie.stir import stir_pictures
-
-        rate = {RATE: self.action[RATE]} if self.action else {}
-        with nullcontext() if timeout is None else time_limit(timeout):
-            frames: Any = self.simulator.frames(self.theta | rate, self.seed, FILM_RATE)
-        if np.isnan(frames.position[0]).all():
-            return None
-        if isinstance(self.simulator, StirSimulator):
-            return stir_pictures(frames, self.simulator.setups[0], (), FILM_SHARE)
-        cups, distance = self.simulator.cups, self.action["distance"]
-        return pour_pictures(frames, cups, distance, (), FILM_SHARE)
-
 
 def films_of(
     calibration: "Calibration",
@@ -154,9 +132,12 @@ def films_of(
     ]
     folder.mkdir(exist_ok=True)
     missing = [film for film in films if not film.path.exists()]
+    # an executor begins with all of them at once
+    simulate = map if compute.executor is None else compute.executor.map
+    made = simulate(partial(film_content, timeout=compute.timeout), missing)
     try:
         with progress_bar("moving pictures", len(missing), shown=progress) as advance:
-            for film, content in zip(missing, _made(missing, compute), strict=True):
+            for film, content in zip(missing, made, strict=True):
                 write_whole(film.path, lambda at, content=content: at.write_bytes(content))
                 advance(1)
     except TimeoutError as err:
@@ -171,15 +152,27 @@ def films_of(
     return films
 
 
-def _made(films: list[Film], compute: "Compute") -> Iterator[bytes]:
-    """The content of each film, in order; an executor begins with all of them at once."""
-    simulate = map if compute.executor is None else compute.executor.map
-    return simulate(partial(_content, timeout=compute.timeout), films)
+def film_content(film: Film, timeout: float | None = None) -> bytes:
+    """Simulate a film and draw it, in WebP; empty if the simulation diverges.
 
+    Raises:
+        TimeoutError: The simulation took longer than the timeout [s].
+    """
+    from ..models import time_limit
+    from ..movie.pour import pour_pictures
+    from ..movie.stir import stir_pictures
 
-def _content(film: Film, timeout: float | None) -> bytes:
-    pictures = film.pictures(timeout)
-    return b"" if pictures is None else encoded(pictures, FILM_RATE)
+    rate = {RATE: film.action[RATE]} if film.action else {}
+    with nullcontext() if timeout is None else time_limit(timeout):
+        frames: Any = film.simulator.frames(film.theta | rate, film.seed, FILM_RATE)
+    if np.isnan(frames.position[0]).all():
+        return b""
+    if isinstance(film.simulator, StirSimulator):
+        pictures = stir_pictures(frames, film.simulator.setups[0], (), FILM_SHARE)
+    else:
+        cups, distance = film.simulator.cups, film.action["distance"]
+        pictures = pour_pictures(frames, cups, distance, (), FILM_SHARE)
+    return encoded(pictures, FILM_RATE)
 
 
 def _url(content: bytes) -> str:

@@ -2,7 +2,6 @@
 
 import json
 import logging
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -24,7 +23,6 @@ from ..files import write_text
 from ..pouring.figures import pour_figure
 from ..run.compute import open_compute
 from ..run.run import REPORT, RUN_TOML, Run, RunOrPath
-from .facts import held_out_of
 from .films import Film, films_of
 from .prose import prose, templates
 from .warnings import Results
@@ -60,28 +58,21 @@ def report(
             command works in it.
         RuntimeError: A simulation took longer than `timeout`.
     """
-    with (
-        Run.entered(run) as opened,
-        open_compute(executor, timeout) as compute,
-        ThreadPoolExecutor(1) as thread,
-    ):
+    with Run.entered(run) as opened, open_compute(executor, timeout) as compute:
         results = Results.of(opened)
         facts = results.facts
         for notice in results.outdated:
             logger.warning(notice)
-        given = results.latest, results.pour, compute
-        make_films = partial(films_of, *given, progress=progress) if moving else list[Film]
-        # workers make films while figures are drawn, which changes settings of this process
-        made = None if compute.executor is None else thread.submit(make_films)
-        figures = figures_of(results)
-        films = make_films() if made is None else made.result()
+        films: list[Film] = []
+        if moving:
+            films = films_of(results.latest, results.pour, compute, progress=progress)
         page = (
             templates(autoescape=True)
             .get_template(PAGE_TEMPLATE)
             .render(
                 **facts,
                 prose=partial(prose, facts=facts),
-                figures=figures,
+                figures=figures_of(results),
                 films=[film for film in films if film.path.stat().st_size],  # else it diverged
                 made_from=_made_from(results),
                 style=(files("bolfi_liquids.data") / STYLE).read_text(encoding="utf-8"),
@@ -116,7 +107,7 @@ def _criticism_figures(criticism: Criticism) -> dict[str, "Figure"]:
     drawn = {"residual": residual_plot(stirs), "strokes": stroke_plot(stirs)}
     if accepted:
         drawn["coefficient"] = coefficient_plot(tree, accepted)
-    if held_out_of(stirs) is not None:
+    if "held_out" in stirs.children:
         drawn["held-out"] = held_out_plot(stirs)
     if "pours" in sources:
         drawn["pours"] = pour_residual_plot(sources["pours"])

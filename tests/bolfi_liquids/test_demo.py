@@ -6,7 +6,7 @@ from importlib.resources import files
 import pytest
 import tomli_w
 
-from bolfi_liquids.calibration.calibrate import CalibrationInputs
+from bolfi_liquids.calibration.calibrate import run_record
 from bolfi_liquids.demo import RECORDING, run_demo
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.open import open_recording
@@ -21,7 +21,7 @@ def of_the_demo(**changes):
     recording = open_recording(files("bolfi_liquids.data") / RECORDING)
     settings = replace(CalibrationSettings(), **changes)
     stirring = stir_simulator([recording], settings.particles)
-    return CalibrationInputs(settings, default_prior(), stirring).record
+    return run_record(settings, default_prior(), stirring)
 
 
 OTHERS = {

@@ -12,8 +12,7 @@ import xarray as xr
 from scipy.stats import chi2
 
 import bolfi_liquids as bl
-from bolfi_liquids.criticism.pour_noise import PourNoise
-from bolfi_liquids.criticism.pours import Fractions
+from bolfi_liquids.criticism.pours import Fractions, PourNoise
 from bolfi_liquids.inputs.bundled import bundled_pours
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.pour_table import open_pours

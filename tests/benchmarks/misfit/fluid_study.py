@@ -34,8 +34,7 @@ from bolfi_liquids.calibration.stirs import (
     held_out_noise,
     stir_experiment,
 )
-from bolfi_liquids.criticism.pour_noise import REPEATABILITY_SD
-from bolfi_liquids.criticism.pours import Fractions
+from bolfi_liquids.criticism.pours import REPEATABILITY_SD, Fractions
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.inputs.recording import Recording, Trajectory
 from bolfi_liquids.inputs.settings import CriticismSettings
@@ -171,7 +170,6 @@ def _clean(bank: inference.SimulationBank) -> list[Clean]:
         recordings,
         MODEL,
         default_prior(),
-        effects_of("stir"),
         compute=Compute(batch=4, bank=bank),
         report=lambda *_: None,
     )

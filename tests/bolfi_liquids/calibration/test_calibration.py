@@ -13,7 +13,6 @@ import numpyro.distributions as dist
 import pytest
 import xarray as xr
 from arviz_stats.base.array import array_stats
-from bolfi_liquids.inference.simulations import job
 
 import bolfi_liquids as bl
 from bolfi_liquids import inference, models
@@ -23,7 +22,9 @@ from bolfi_liquids.calibration.figures import grid_density, marginal
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.simulators import StirSimulator, stir_simulator
+from bolfi_liquids.simulators import stir_simulator
+
+SHORT = 60  # samples of `short_recording`
 
 
 def test_summary_is_of_the_posterior(calibration, settings):
@@ -62,6 +63,15 @@ def test_summary_says_below_which_viscosity_liquids_look_alike(
     assert calibration.summary.below_least_viscosity == pytest.approx((draws < floor).mean())
 
 
+def test_run_toml_says_how_it_was_made(calibration, short_recording, settings):
+    record = tomllib.loads((calibration.path / "run.toml").read_text())
+    assert record["settings"]["seed"] == settings["seed"]
+    assert record["settings"]["particles"] == settings["particles"]
+    assert record["inputs"]["sha256"] == [bl.open_recording(short_recording).hash]
+    assert record["versions"]["bolfi-liquids"] == bl.__version__
+    assert record["simulator"]["recording_1"]["particles"] == settings["particles"]
+
+
 def test_closest_is_of_the_posterior_draws_and_reproducible(calibration, short_recording, settings):
     stirring = stir_simulator([bl.open_recording(short_recording)], settings["particles"])
     drawn = calibration.tree["posterior_predictive"]["inclination"].to_numpy()[0]
@@ -87,15 +97,6 @@ def test_the_grid_of_a_narrow_posterior_resolves_it(calibration):
     assert np.sqrt(mass @ (x - mean) ** 2 / mass.sum()) == pytest.approx(drawn.std(), rel=0.1)
 
 
-def test_run_toml_says_how_it_was_made(calibration, short_recording, settings):
-    record = tomllib.loads((calibration.path / "run.toml").read_text())
-    assert record["settings"]["seed"] == settings["seed"]
-    assert record["settings"]["particles"] == settings["particles"]
-    assert record["inputs"]["sha256"] == [bl.open_recording(short_recording).hash]
-    assert record["versions"]["bolfi-liquids"] == bl.__version__
-    assert record["simulator"]["recording_1"]["particles"] == settings["particles"]
-
-
 def test_several_recordings_add_up(short_recording, dataset, tmp_path, rng, settings):
     other = tmp_path / "other.nc"
     dataset.isel(time=slice(0, 40)).to_netcdf(other)
@@ -112,29 +113,49 @@ def test_several_recordings_add_up(short_recording, dataset, tmp_path, rng, sett
     assert len({both.identity, *(part.identity for part in parts)}) == 3
 
 
-def test_two_liquids_are_not_one_calibration(short_recording, dataset, tmp_path):
-    water = tmp_path / "water.nc"
-    dataset.assign_attrs(liquid_density=1000.0).to_netcdf(water)
-    with pytest.raises(ValueError, match=r"water\.nc: attribute liquid_density: 1000.0 kg/m3"):
-        bl.calibrate([short_recording, water], out=tmp_path / "run", progress=False)
-    assert not (tmp_path / "run").exists()
-
-
-def test_prior_with_another_parameter_is_refused(short_recording, tmp_path):
-    prior = inference.Prior({"viscosity": dist.Uniform(0.1, 1.0), "cohesin": dist.Uniform(0, 1)})
-    with pytest.raises(ValueError, match="viscosity, cohesin, expected viscosity, cohesion"):
-        bl.calibrate(short_recording, out=tmp_path / "run", prior=prior, progress=False)
-    assert not (tmp_path / "run").exists()
-
-
 class Mine(dist.Uniform):
     """A distribution that numpyro does not have."""
 
 
-def test_a_prior_that_a_run_could_not_be_resumed_with_is_refused(short_recording, tmp_path):
-    prior = inference.Prior({"viscosity": Mine(0.1, 1.0), "cohesion": dist.Uniform(0.0, 1.0)})
-    with pytest.raises(ValueError, match="prior of viscosity: .*cannot be written down"):
-        bl.calibrate(short_recording, out=tmp_path / "run", prior=prior, progress=False)
+def changed(**attrs):
+    return lambda dataset: dataset.assign_attrs(attrs)
+
+
+def first(start, stop, step=None):
+    return lambda dataset: dataset.isel(time=slice(start, stop, step))
+
+
+def prior_of(**distributions):
+    return {"prior": inference.Prior(distributions)}
+
+
+UNIT = dist.Uniform(0.1, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"other": changed(liquid_density=1000.0)}, "other.nc: attribute liquid_density"),
+        ({"other": first(0, SHORT)}, "short.nc"),  # given twice
+        ({"baseline": first(None, None, 2)}, "baseline"),
+        ({"baseline": changed(cup_radius=0.05)}, "cup_radius"),
+        ({"baseline": first(10, None)}, "baseline.nc"),  # does not rest before it stirs
+        ({"baseline": first(0, SHORT)}, "baseline"),  # is what is calibrated on
+        ({"baseline": first(0, None), "surrogate": "discrepancy"}, "baseline"),
+        (prior_of(viscosity=UNIT, cohesin=UNIT), "cohesin"),
+        (prior_of(viscosity=Mine(0.1, 1.0), cohesion=UNIT), "viscosity"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_by_its_name_before_anything_is_written(
+    short_recording, dataset, tmp_path, given, field
+):
+    options = dict(given)
+    for name in {"other", "baseline"} & set(given):
+        options[name] = tmp_path / f"{name}.nc"
+        given[name](dataset).to_netcdf(options[name])
+    recordings = [short_recording, *([options.pop("other")] if "other" in given else [])]
+    with pytest.raises(InputError, match=field):
+        bl.calibrate(recordings, out=tmp_path / "run", progress=False, **options)
     assert not (tmp_path / "run").exists()
 
 
@@ -143,18 +164,17 @@ def test_default_prior_covers_water_to_gel():
     np.testing.assert_array_equal(default_prior().contains(theta), [False, True, True, False])
 
 
-def test_a_run_that_was_not_finished_says_how_to_go_on(calibration, tmp_path):
-    (tmp_path / "run.toml").write_bytes((calibration.path / "run.toml").read_bytes())
-    with pytest.raises(ValueError, match="not finished.*--resume"):
-        bl.Calibration.open(tmp_path)
-
-
-def test_it_prints_its_quantiles_and_whether_the_sampler_converged(calibration):
+def test_it_prints_its_quantiles_and_opens_as_it_was_made(calibration, short_recording, settings):
     said = repr(calibration)
     assert str(calibration.path) in said and str(calibration.summary.sampler_status) in said
     for name, values in calibration.summary.parameters.items():
         assert name in said and f"{values.q50:.3g}" in said
         assert f"{values.q95:.3g}" in calibration._repr_html_()
+    given = {name: np.int64(value) for name, value in settings.items()}
+    again = bl.calibrate(
+        short_recording, out=calibration.path, resume=True, progress=False, **given
+    )
+    assert again.summary == calibration.summary
 
 
 @pytest.mark.parametrize(
@@ -184,70 +204,19 @@ def test_what_the_bank_holds_beside_stirs_is_not_counted(
     assert again.summary.parameters == calibration.summary.parameters
 
 
-def test_an_aborted_recording_is_logged(short_recording, tmp_path, monkeypatch, caplog):
-    aborted = tmp_path / "aborted.nc"
+def test_a_run_begins_in_a_temporary_directory_and_says_that_a_recording_was_aborted(
+    short_recording, tmp_path, monkeypatch, caplog
+):
+    aborted, found = tmp_path / "aborted.nc", []
     with xr.open_dataset(short_recording, decode_times=False) as whole:
         whole.assign_attrs(status="aborted", reason="protective stop").to_netcdf(aborted)
-    monkeypatch.setattr(calibrating, "_calibrate", lambda *_: None)
+    monkeypatch.setattr(calibrating, "_calibrate", lambda run, *_: found.append(run.path))
     with pytest.raises(InputError, match="not finished"):
-        bl.calibrate([short_recording, aborted], out=tmp_path / "run", progress=False)
+        bl.calibrate([short_recording, aborted], progress=False)
     (notice,) = caplog.records
     assert str(aborted) in notice.getMessage() and "protective stop" in notice.getMessage()
-
-
-def test_settings_may_be_integers_of_numpy(short_recording, calibration, settings):
-    """They are those of the run, which is only opened."""
-    given = {name: np.int64(value) for name, value in settings.items()}
-    again = bl.calibrate(
-        short_recording, out=calibration.path, resume=True, progress=False, **given
-    )
-    assert again.summary == calibration.summary
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::bolfi_liquids.inference.surrogates.warnings.EmulatorWarning")
-def test_stirs_that_take_too_long_are_counted_and_their_limit_is_kept(
-    short_recording, settings, tmp_path, monkeypatch, caplog
-):
-    simulate, calls = StirSimulator.simulate, []
-
-    def slow(self, theta, seeds):
-        calls.append(seeds)
-        if len(calls) in (1, 2):  # the first batch together, then its first alone
-            raise models.TimeLimitExceeded
-        return simulate(self, theta, seeds)
-
-    monkeypatch.setattr(StirSimulator, "simulate", slow)
-    monkeypatch.setattr(job, "within", given_up)
-    made = bl.calibrate(
-        short_recording, out=tmp_path / "run", timeout=600.0, progress=False, **settings
-    )
-    notices = [one.args for one in caplog.records if one.name.endswith("run.simulations")]
-    learned = made.tree["simulations"].sizes["simulation"]
-    assert notices == [(1, learned, 600.0)]
-
-
-def given_up(timeout, call, limit=None):
-    """As if the time were over where the simulator says so."""
-    try:
-        return call()
-    except TimeoutError as error:
-        raise job.Overdue from error
-
-
-def test_without_a_directory_a_run_is_among_the_temporary_files(short_recording, monkeypatch):
-    found = []
-
-    def begun(run, *_):
-        found.append((run.path, (run.path / "run.toml").is_file()))
-
-    monkeypatch.setattr(calibrating, "_calibrate", begun)
-    with pytest.raises(InputError, match="not finished"):
-        bl.calibrate(short_recording, progress=False)
-    ((run, has_begun),) = found
-    assert has_begun
-    assert str(run).startswith(tempfile.gettempdir())
-    shutil.rmtree(run)
+    assert str(found[0]).startswith(tempfile.gettempdir()) and (found[0] / "run.toml").is_file()
+    shutil.rmtree(found[0])
 
 
 @pytest.mark.slow

@@ -1,14 +1,26 @@
-"""Windows of a stir."""
+"""Windows of a stir, the noise in it, and what clean recordings say of the simulator's error."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from bolfi_liquids.hardware.motion import Trajectory, star
 
-from bolfi_liquids.calibration.stirs import windows
+from bolfi_liquids.calibration.model_error import Clean, regime_distance, usual_for
+from bolfi_liquids.calibration.stirs import (
+    camera_noise,
+    held_out_noise,
+    stir_experiment,
+    stir_proposals,
+    windows,
+)
+from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.recording import Recording
 from bolfi_liquids.inputs.strokes import resting
-from bolfi_liquids.simulators import StirSimulator
+from bolfi_liquids.simulators import StirSimulator, stir_simulator
+
+AT_REST, RHO, SD = 16, 0.6, np.radians(0.2)
 
 
 def recorded(path: Trajectory) -> Recording:
@@ -25,3 +37,87 @@ def test_windows_cover_every_sample_of_every_recording_once_by_stroke():
     by_speed = np.sum([window.samples for window in made if "speed" in window.label], axis=0)
     moving = np.concatenate([~resting(recording) for recording in both])
     assert (by_speed == moving[:, None]).all()
+
+
+@pytest.fixture(scope="module")
+def stirred(calibration):
+    """The run's recording."""
+    return calibration.run.recordings[0]
+
+
+def noisy(recording, rng, sd=SD):
+    """The recording, with AR(1) noise alone as its inclination."""
+    noise = sd * rng.normal(size=recording.inclination.shape)
+    for i in range(1, len(noise)):
+        noise[i] = RHO * noise[i - 1] + np.sqrt(1.0 - RHO**2) * noise[i]
+    return replace(recording, inclination=noise)
+
+
+def test_the_cameras_noise_is_that_of_the_rest_and_correlated(stirred):
+    """On average over recordings: one of them knows it to a third only."""
+    rng = np.random.default_rng(0)
+    found = [camera_noise([noisy(stirred, rng)]) for _ in range(40)]
+    assert {one.samples for one in found} == {2 * AT_REST}
+    # the median of the posterior's sizes, and of their correlations, on average
+    sizes = [np.median(one.sd) / SD for one in found]
+    error = np.std(sizes) / np.sqrt(len(sizes))
+    assert abs(np.mean(sizes) - 1.0) < 4.0 * error + 0.1
+    assert np.mean([np.mean(one.correlation) for one in found]) > 0.25
+
+
+def test_fitted_recordings_tell_of_the_cameras_that_saw_those_held_out(stirred, rng):
+    one, other = (noisy(stirred, rng) for _ in range(2))
+    assert held_out_noise(one, [other]).samples == 2 * camera_noise([one]).samples
+    slower = replace(other, time=1.1 * other.time)
+    assert held_out_noise(one, [slower]).samples == camera_noise([one]).samples
+
+
+def test_a_camera_without_any_noise_is_not_believed(stirred, rng):
+    still = noisy(stirred, rng, sd=0.0)
+    # its mean is not 0.3 to the last bit
+    half = replace(still, inclination=0.3 + still.inclination)
+    half.inclination[:, 0] += rng.normal(size=len(still.time))
+    for recordings in ([still], [half], [noisy(stirred, rng), still]):
+        with pytest.raises(InputError) as refused:
+            camera_noise(recordings)
+        assert refused.value.where == still.path.name
+
+
+def test_clean_recordings_of_the_same_path_say_where_it_errs(stirred, rng):
+    recording = noisy(stirred, rng)
+    residual = 10.0 * SD * np.sin(np.linspace(0.0, 9.0, len(recording.time)))[:, None] * [1.0, 0.5]
+    clean = [Clean(recording, residual, 1.0, 1)]
+    stirring = stir_simulator([recording], 200)
+    same, elsewhere = (usual_for(stirring, clean, 0.5, elsewhere=other) for other in (False, True))
+    assert [one.same for one in same.clean] == [True]
+    assert [one.same for one in elsewhere.clean] == [False]
+    cameras = camera_noise([recording])
+    noise = stir_experiment(stirring, cameras, same, "stir").noise
+    assert [type(part).__name__ for part in noise.parts] == ["AutoregressiveNoise", "ModelError"]
+    assert usual_for(stirring, [], 0.5) is None
+    assert stir_experiment(stirring, cameras, None, "stir").noise is cameras
+
+
+def test_proposed_stirs_stay_within_the_cup_and_below_the_limit_of_speed(stirred, rng):
+    gripper, factor = stirred.gripper, np.array([1.5, 1.5, 1.0])  # a path beyond the cup
+    wide = replace(stirred, gripper=Trajectory(gripper.time, factor * gripper.position))
+    stirring = stir_simulator([noisy(wide, rng)], 200)
+    made = stir_proposals(stirring, camera_noise(stirring.recordings), None)
+    assert len({one.label for one in made}) == len({one.identity for one in made}) == len(made) == 4
+    cup, stick = stirring.setups[0].cup, stirring.setups[0].stick
+    for one in made:
+        (plan,) = one.simulate.simulate.__self__.recordings
+        path = plan.gripper.position[:, :2]
+        assert np.linalg.norm(path, axis=1).max() < cup.radius - stick.radius
+        assert one.shape == plan.inclination.shape
+        step = np.linalg.norm(np.diff(path, axis=0), axis=1) / np.diff(plan.gripper.time)
+        assert step.max() < 0.21
+
+
+def test_liquids_are_as_far_apart_as_their_viscosities():
+    """In doublings; all are alike where one is unknown."""
+    np.testing.assert_allclose(regime_distance([0.1, 0.4, 1.6], 0.4, 0.005), [-2.0, 0.0, 2.0])
+    assert (regime_distance([0.001, 0.1], None, 0.005) == 0.0).all()
+    assert (regime_distance([None, 1.0], 1.0, 0.005) == 0.0).all()
+    # water is water, wherever below the least viscosity it was fitted
+    np.testing.assert_allclose(regime_distance([3e-4, 0.004, 0.01], 0.001, 0.005), [0.0, 0.0, 1.0])

@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 
 from bolfi_liquids.calibration.figures import contour_levels, marginal
-from bolfi_liquids.calibration.noise import irreducible_rms, replicate_noise, sensor_noise
 from bolfi_liquids.calibration.result import pick_draws
+from bolfi_liquids.calibration.stirs import irreducible_rms, replicate_noise, sensor_noise
 from bolfi_liquids.calibration.summary import CalibrationSummary, bad_fit
 from bolfi_liquids.cli.printed import print_warnings
 from bolfi_liquids.pouring.spillage import mean_spillage, tail_spillage

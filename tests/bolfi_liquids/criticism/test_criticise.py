@@ -1,103 +1,155 @@
-"""Criticism of a run: what it is given, and the whole way on few simulations."""
+"""What a criticism is given: read, checked and written down."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import bolfi_liquids as bl
-from bolfi_liquids.criticism.pours import as_prior
-from bolfi_liquids.errors import InputError
+from bolfi_liquids.criticism.inputs import open_inputs
+from bolfi_liquids.errors import Argument, InputError
 from bolfi_liquids.inputs.bundled import bundled_recording
-from bolfi_liquids.inputs.prior import default_prior
+from bolfi_liquids.inputs.cups import bundled_cups
+from bolfi_liquids.inputs.open import open_recordings
+from bolfi_liquids.inputs.settings import CriticismSettings
 from bolfi_liquids.run.recordings import kept_recordings
 
+HEADER = "angular_velocity_deg_s,distance_cm,spilled,received,retained"
+ROWS = ["45,1,5,90,5", "90,2,10,85,5", "60,3,20,75,5"]
 
-@pytest.mark.slow
-def test_what_stirs_taught_becomes_a_prior_of_the_same_mean_and_spread():
-    rng = np.random.default_rng(1)
-    theta = {
-        "viscosity": np.exp(rng.normal(-2.0, 0.4, 4000)),
-        "cohesion": rng.uniform(0.0, 1.0, 4000),
+
+@pytest.fixture(scope="module")
+def files(calibration, tmp_path_factory):
+    """Paths of what a criticism may be given, by a short name."""
+    tmp_path = tmp_path_factory.mktemp("given")
+    dataset = xr.load_dataset(bundled_recording("glycerin").path, decode_times=False)
+
+    def table(rows):
+        return "\n".join([HEADER, *rows]) + "\n"
+
+    stirs = {
+        "held": {},
+        "clean": {},
+        "wide": {"cup_radius": 0.05},
+        "dense": {"liquid_density": 9e2},
     }
-    learned = as_prior(theta, np.full(4000, 1 / 4000), default_prior())
-    median = learned.from_unit(np.full((1, 2), 0.5))
-    assert abs(np.log(median["viscosity"][0]) + 2.0) < 0.05
-    upper = learned.from_unit(np.full((1, 2), 0.841))
-    assert abs(np.log(upper["viscosity"][0]) + 1.6) < 0.05
-    ends = learned.from_unit(np.array([[0.0, 0.0], [1.0, 1.0]]))["cohesion"]
-    np.testing.assert_allclose(ends, [0.0, 1.0], atol=1e-6)
+    for name, attrs in stirs.items():
+        dataset.assign_attrs(attrs, note=name).to_netcdf(tmp_path / f"{name}.nc")
+    dataset.isel(time=slice(0, None, 2)).to_netcdf(tmp_path / "slow.nc")
+    (tmp_path / "b").mkdir()
+    dataset.assign_attrs(note="b").to_netcdf(tmp_path / "b" / "held.nc")
+    pours = {"pours": ROWS, "others": ROWS[::-1], "far": [*ROWS, "60,50,33,33,34"]}
+    for name, rows in pours.items():
+        (tmp_path / f"{name}.csv").write_text(table(rows))
+    (own,) = calibration.run.recordings
+    made = {path.stem: path for path in (*tmp_path.glob("*.nc"), *tmp_path.glob("*.csv"))}
+    return made | {"fitted": own.path, "namesake": tmp_path / "b" / "held.nc"}
 
 
-def test_a_run_keeps_its_recordings(calibration):
-    (kept,) = calibration.run.recordings
-    assert [kept.hash] == calibration.record["inputs"]["sha256"]
+@pytest.fixture
+def given(calibration, files):
+    """(option=short names) -> the inputs of a criticism."""
+
+    def opened(settings=None, cups=None, **names):
+        def paths(option):
+            return [files[name] for name in names.get(option, "").split()]
+
+        recordings = [
+            open_recordings(paths(option), Argument(option)) for option in ("held_out", "baseline")
+        ]
+        poured = [next(iter(paths(option)), None) for option in ("pours", "held_out_pours")]
+        return open_inputs(calibration, settings or CriticismSettings(), *recordings, poured, cups)
+
+    return opened
 
 
-def test_a_changed_copy_is_refused(calibration, tmp_path):
-    (kept,) = calibration.run.recordings
-    folder = tmp_path / "recordings"
-    folder.mkdir()
-    (folder / kept.path.name).write_bytes(kept.path.read_bytes())
-    record = {**calibration.record, "inputs": {"sha256": ["another"]}}
-    with pytest.raises(InputError, match="not the recording that this run was calibrated on"):
-        kept_recordings(tmp_path, record)
+def test_what_a_result_was_made_from_names_every_file(given):
+    cups = bundled_cups()
+    higher = cups.model_copy(update={"pour": cups.pour.model_copy(update={"lip_height": 0.21})})
+    inputs = given(baseline="clean", held_out="held", pours="pours", cups=higher)
+    made_from = inputs.made_from
+    assert set(made_from["baseline"]) == {"clean.nc"} and set(made_from["held_out"]) == {"held.nc"}
+    assert set(made_from["pours"]) == {"pours.csv"} and made_from["settings"]["seed"] == 0
+    assert made_from["poured"]["cups"]["pour"]["lip_height"] == 0.21 != cups.pour.lip_height
+    assert inputs.level == 0.025  # of each of two sources
+
+
+def test_other_settings_or_files_are_another_question(given):
+    asked = [
+        given(),
+        given(CriticismSettings(seed=1)),
+        given(baseline="clean"),
+        given(held_out="clean"),
+        given(pours="pours"),
+        given(pours="pours", held_out_pours="others"),
+    ]
+    made_from = [inputs.made_from for inputs in asked]
+    assert all(one != two for i, one in enumerate(made_from) for two in made_from[:i])
+    assert made_from[0] == given().made_from
+
+
+def test_a_clean_recording_that_is_criticised_or_held_out_is_no_baseline(given):
+    inputs = given(held_out="held", baseline="fitted held clean")
+    assert [recording.path.name for recording in inputs.baseline] == ["clean.nc"]
+    assert [name.removeprefix("1-") for name in inputs.left_out] == ["short.nc", "held.nc"]
+    assert inputs.made_from != given(held_out="held", baseline="clean").made_from
+
+
+def test_one_recording_that_was_opened_is_not_held_out_twice(calibration, given):
+    (one,) = given(held_out="held").held_out
+    with pytest.raises(InputError, match="held_out"):
+        open_inputs(calibration, CriticismSettings(), [one, one], [])
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("names", "where"),
     [
-        ({"effects": ["magic"]}, "there is no effect magic"),
-        ({"pours": "nowhere.csv"}, "nowhere.csv: no such file"),
-        ({"held_out": "nowhere.nc"}, "nowhere.nc: no such file"),
-        ({"seed": -1}, "seed: -1"),
-        ({"cups": "cups.toml"}, "cups: "),
-        ({"effects": "camera_dealy"}, "there is no effect camera_dealy"),
-        ({"accept": "foo"}, "accept: 'foo' is none of the effects"),
-        ({"effects": "camera_delay", "accept": ["camera_tilt"]}, "choose from camera_delay"),
+        ({"held_out": "held namesake"}, "held_out"),
+        ({"held_out": "fitted"}, "held_out"),
+        ({"held_out": "wide"}, "held_out"),
+        ({"held_out": "dense"}, "held_out"),
+        ({"baseline": "slow"}, "baseline"),
+        ({"held_out_pours": "others"}, "held_out_pours"),
+        ({"pours": "pours", "held_out_pours": "pours"}, "held_out_pours"),
+        ({"pours": "pours", "held_out_pours": "far"}, "far.csv"),
+        ({"pours": "pours", "cups": 3}, "cups"),
+        ({"settings": {"effects": "magic"}}, "effects"),
+        ({"settings": {"effects": "adhesion"}}, "effects"),
+        ({"settings": {"effects": "camera_delay"}, "pours": "pours"}, "effects"),
+        ({"settings": {"effects": "camera_delay", "accept": "camera_tilt"}}, "accept"),
     ],
 )
-def test_what_cannot_be_used_is_refused_before_anything_is_simulated(calibration, options, said):
+def test_what_cannot_be_used_is_refused_by_its_name(given, names, where):
+    options: dict = dict(names)
+    if "settings" in names:
+        options["settings"] = CriticismSettings(**names["settings"])
     with pytest.raises(InputError) as refused:
-        bl.criticise(calibration, progress=False, **options)
-    assert said in str(refused.value)
+        given(**options)
+    assert where in refused.value.where
 
 
 def test_what_is_held_out_or_clean_in_a_wrong_frame_is_told(calibration, caplog):
     right = bundled_recording("glycerin")
     xz, yz = right.inclination.T
-    given = {
-        "held_out": replace(
-            right,
-            path=Path("turned.nc"),
-            hash="a",
-            inclination=np.column_stack([xz - yz, xz + yz]) / np.sqrt(2.0),
-        ),
-        "baseline": replace(
-            right, path=Path("mirrored.nc"), hash="b", inclination=np.column_stack([xz, -yz])
-        ),
-    }
-    for name, recording in given.items():
-        caplog.clear()
-        # the limit of time is looked at last, before anything is simulated
-        with pytest.raises(InputError, match="timeout"):
-            bl.criticise(calibration, progress=False, timeout=-1.0, **{name: recording})
-        (notice,) = [one.getMessage() for one in caplog.records]
-        assert notice.startswith(f"{recording.path}: ")
-        caplog.clear()
-        with pytest.raises(InputError, match="timeout"):
-            good = replace(recording, inclination=right.inclination)
-            bl.criticise(calibration, progress=False, timeout=-1.0, **{name: good})
-        assert caplog.records == []
+    turned, mirrored = ([xz - yz, xz + yz] / np.sqrt(2.0)).T, np.column_stack([xz, -yz])
+    for option, wrong in (("held_out", turned), ("baseline", mirrored)):
+        for seen, count in ((wrong, 1), (right.inclination, 0)):
+            caplog.clear()
+            one = replace(right, path=Path("other.nc"), hash="a", inclination=seen)
+            # the limit of time is looked at last, before anything is simulated
+            with pytest.raises(InputError, match="timeout"):
+                bl.criticise(calibration, progress=False, timeout=-1.0, **{option: one})
+            notices = [record.getMessage() for record in caplog.records]
+            assert len(notices) == count and all(text.startswith("other.nc: ") for text in notices)
 
 
-def test_data_that_were_fitted_prove_nothing(calibration):
+def test_a_run_keeps_its_recordings_and_refuses_a_changed_copy(calibration, tmp_path):
     (kept,) = calibration.run.recordings
-    with pytest.raises(InputError, match="is what the run was calibrated on"):
-        bl.criticise(calibration, held_out=kept, progress=False)
-
-
-def test_a_run_without_criticism_says_so(calibration):
-    with pytest.raises(InputError, match="bolfi-liquids criticise"):
-        bl.Criticism.open(calibration.path)
+    assert [kept.hash] == calibration.record["inputs"]["sha256"]
+    (tmp_path / "recordings").mkdir()
+    (tmp_path / "recordings" / kept.path.name).write_bytes(kept.path.read_bytes())
+    record = {**calibration.record, "inputs": {"sha256": ["another"]}}
+    with pytest.raises(InputError, match=kept.path.name):
+        kept_recordings(tmp_path, record)

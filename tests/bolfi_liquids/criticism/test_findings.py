@@ -5,18 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
-from bolfi_liquids.inference.surrogates.measurement_noise import Layout
+from bolfi_liquids.inference.criticism import Gap
 
 from bolfi_liquids.criticism import criticism_file
 from bolfi_liquids.criticism.criticism_file import (
-    Sources,
     _effects,
     _posterior,
+    _residual,
     best_of,
     criticism_tree,
 )
-from bolfi_liquids.criticism.pour_noise import REPEATABILITY_SD, SIMULATOR_ERROR_SD, PourNoise
-from bolfi_liquids.criticism.summary import unsupported
+from bolfi_liquids.criticism.summary import GapSummary, unsupported
 from bolfi_liquids.inputs.settings import CriticismSettings
 
 
@@ -32,22 +31,27 @@ def model(names, value):
     return SimpleNamespace(names=names, fit=fit, best=dict.fromkeys(parameters, value))
 
 
+def found_in(stirs, pours=None):
+    return {"stirs": stirs} if pours is None else {"stirs": stirs, "pours": pours}
+
+
 def source(accepted, extended):
-    base = SimpleNamespace(hypothesis=model((), 0.0))
+    base = SimpleNamespace(hypothesis=model((), 0.0), signatures=())
     concluded = {"accepted": accepted, "extended": extended, "base": base}
-    return SimpleNamespace(**concluded, gaps={}, suggestions=())
+    return SimpleNamespace(**concluded, gaps={}, suggestions=(), confusion=np.zeros((0, 0)))
 
 
 @pytest.fixture
 def attributes(monkeypatch):
     """(stirs, pours, accept) -> attributes of criticism.nc, whose tables stay empty."""
-    for table in ("_stirs_residual", "_pours_residual", "_where", "_effects", "_confusion"):
+    for table in ("_residual", "_where", "_effects"):
         monkeypatch.setattr(criticism_file, table, lambda *_: xr.Dataset())
 
     def attributes(stirs, pours, accept=None):
         settings = CriticismSettings(accept=accept)
-        inputs = SimpleNamespace(settings=settings, density=1000.0, stirring=None, table=pours)
-        return criticism_tree(inputs, Sources(stirs, pours)).attrs
+        stirring = SimpleNamespace(time=np.zeros(1), member=np.zeros(1, int))
+        inputs = SimpleNamespace(settings=settings, density=1000.0, stirring=stirring, table=None)
+        return criticism_tree(inputs, found_in(stirs, pours)).attrs
 
     return attributes
 
@@ -61,7 +65,6 @@ NOTHING = source((), None)
     ("stirs", "pours", "expected"),
     [
         (NOTHING, None, {"viscosity": 0.0, "cohesion": 0.0}),
-        (DELAY, None, {"viscosity": 1.0, "cohesion": 1.0, "camera_delay": 1.0}),
         (DELAY, NOTHING, {"viscosity": 1.0, "cohesion": 1.0, "camera_delay": 1.0}),
         (
             DELAY,
@@ -74,12 +77,12 @@ NOTHING = source((), None)
             {"viscosity": 2.0, "cohesion": 2.0, "shear_thinning": 2.0, "adhesion": 2.0},
         ),
     ],
-    ids=["nothing", "stirs alone", "pours agree", "a sensor's", "a liquid's"],
+    ids=["nothing", "pours agree", "a sensor's", "a liquid's"],
 )
 def test_the_last_model_says_what_it_knows_and_the_stirs_the_rest(
     attributes, stirs, pours, expected
 ):
-    together = Sources(stirs, pours)
+    together = found_in(stirs, pours)
     assert best_of(together) == expected
     posterior = _posterior(together, 0)
     assert {name: float(values.mean()) for name, values in posterior.items()} == expected
@@ -90,13 +93,10 @@ def test_what_was_requested_is_told_from_what_was_found(attributes):
     pours = source(("adhesion",), model(("adhesion",), 2.0))
     assert attributes(DELAY, pours, accept=("adhesion",))["requested"] == ["adhesion"]
     assert attributes(DELAY, pours)["requested"] == []
-
-
-@pytest.mark.parametrize(("explains", "expected"), [(True, ()), (False, ("camera_delay",))])
-def test_what_is_accepted_though_it_explains_nothing_is_told(explains, expected):
     stirs = source(("camera_delay",), model(("camera_delay",), 1.0))
-    stirs.leading = SimpleNamespace(accepted=explains)
-    assert unsupported(Sources(stirs)) == expected
+    for explains, expected in ((True, ()), (False, ("camera_delay",))):
+        stirs.leading = SimpleNamespace(accepted=explains)
+        assert unsupported({"stirs": stirs}) == expected
 
 
 def candidate(name, **changes):
@@ -142,14 +142,38 @@ def test_each_effect_has_one_row_that_says_what_became_of_it():
     assert table.sizes["effect"] == len(names)
 
 
-def test_pours_of_like_actions_are_wrong_together_and_outcomes_apart():
-    noise = PourNoise(np.radians([45.0, 46.0, 170.0]), np.array([0.02, 0.021, 0.06]))
-    at = Layout(np.tile([0, 1, 2], 2), np.repeat([0, 1], 3))  # pours, outcomes
-    covariance = noise.covariance(at)
-    sd = np.sqrt(np.diag(covariance))
-    np.testing.assert_allclose(sd, np.hypot(REPEATABILITY_SD, np.repeat(SIMULATOR_ERROR_SD, 3)))
-    correlation = covariance / np.outer(sd, sd)
-    assert correlation[0, 1] > 0.9 > 0.2 > correlation[0, 2] >= 0.0
-    assert (correlation[:3, 3:] == 0.0).all()
-    drawn = noise.draw(np.random.default_rng(0), at, 20_000)
-    np.testing.assert_allclose(np.cov(drawn.T), covariance, atol=6.0 * 0.01 * sd.max() ** 2)
+def hypothesis(difference):
+    """Of four data, of which it leaves the difference [rad]."""
+    output = SimpleNamespace(restore=lambda rows: rows.reshape(-1, 2, 2))
+    return SimpleNamespace(
+        difference=np.array(difference),
+        own=3.0 * np.eye(4),
+        spread=5.0 * np.eye(4),
+        noise=4.0 * np.eye(4),
+        surrogate=SimpleNamespace(output=output),
+        names=("camera_delay",),
+    )
+
+
+def test_gaps_and_residuals_are_observed_less_expected():
+    before, after = hypothesis([5.0, -5.0, 5.0, -5.0]), hypothesis([3.0, -3.0, 3.0, -3.0])
+    gap = Gap("third", before=10.0, after=6.0, noise=3.0, usual=4.0, floor=0, p_value=1, lpd_gain=0)
+    found = SimpleNamespace(
+        leading=SimpleNamespace(hypothesis=after, names=after.names),
+        base=SimpleNamespace(hypothesis=before),
+        extended=after,
+        gaps={after.names: (gap, gap)},
+        measurement=6.0 * np.eye(4),
+        usual=4.0,
+        observed=np.zeros((2, 2)),
+    )
+    summary = {name: np.radians(of) for name, of in vars(GapSummary.of(found)).items()}
+    expected = {"noise": 3.0, "usual": 4.0, "rms_before": 5.0, "rms_after": 3.0}
+    expected |= {"before": 0.0, "after": 0.0}
+    expected |= {"held_out_noise": 3.0, "held_out_usual": 4.0}
+    expected |= {"held_out_rms_before": 10.0, "held_out_rms_after": 6.0}
+    expected |= {"held_out_before": np.sqrt(75.0), "held_out_after": np.sqrt(11.0)}
+    assert summary == pytest.approx(expected, abs=1e-9)
+    residual = _residual(found, ("frame", "plane"), {"units": "rad"})
+    assert residual["expected_after"].to_numpy().tolist() == [[-3.0, 3.0], [-3.0, 3.0]]
+    assert (residual["sd_before"] == 3.0).all() and residual["observed"].attrs["units"] == "rad"

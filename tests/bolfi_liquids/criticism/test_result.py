@@ -3,17 +3,16 @@
 import json
 import pickle
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.summary import bad_fit
-from bolfi_liquids.criticism.criticise import _learned_from
 from bolfi_liquids.criticism.result import calibration_to_pour
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.inputs.settings import CriticismSettings
 from bolfi_liquids.run.run import Run
 
 
@@ -49,11 +48,6 @@ def test_an_extended_calibration_shows_its_own_parameters(extended, calibration,
     assert calibration.summary == bl.Calibration.open(criticised).summary  # left as it was
 
 
-def test_its_search_is_that_of_the_base(extended):
-    figure = new_figure(6.0, 6.0)
-    assert extended.plot_search(figure.subplots(3, 1, squeeze=False)).shape == (3, 1)
-
-
 BAD = {"fit_rms_deg": 2.0, "noise_deg": 0.2}
 
 
@@ -76,17 +70,27 @@ def test_an_effect_of_pours_alone_mends_no_stir(criticised, with_numbers):
     assert bad_fit(calibration_to_pour(Run.open(criticised)).summary) is not None
 
 
-def test_plots_of_the_base_model_are_refused(extended, criticised):
+def test_an_accepted_turn_of_the_cameras_mends_a_turned_frame(calibration):
+    turned = replace(calibration.summary, frame_faults=("stir.nc: turned by 45 deg",))
+    posterior = calibration.posterior
+    rotation = {"camera_rotation": posterior["cohesion"]}
+    assert turned.extended(posterior).frame_faults
+    assert not turned.extended(posterior.assign(rotation)).frame_faults
+
+
+def test_plots_of_the_base_model_are_refused_and_its_search_is_the_bases(extended, criticised):
     for plot in (extended.plot_fit, extended.plot_posterior):
         with pytest.raises(ValueError, match="camera_delay"):
             plot()
     bl.Criticism.open(criticised).base.plot_fit()
+    figure = new_figure(6.0, 6.0)
+    assert extended.plot_search(figure.subplots(3, 1, squeeze=False)).shape == (3, 1)
 
 
 def test_it_can_be_criticised(extended, calibration):
-    theta, signals, seeds = _learned_from(extended)
+    theta, signals, seeds = extended.learned_from
     assert set(theta) == {"viscosity", "cohesion"}
-    np.testing.assert_array_equal(seeds, _learned_from(calibration)[2])
+    np.testing.assert_array_equal(seeds, calibration.learned_from[2])
     assert len(signals) == len(seeds)
 
 
@@ -98,25 +102,26 @@ def test_results_travel(extended, criticised, pour):
     np.testing.assert_array_equal(again.posterior["viscosity"], extended.posterior["viscosity"])
 
 
-def test_a_criticism_of_another_posterior_does_not_count(criticised):
-    run = Run.open(criticised)
+def of_another(path):
+    run = Run.open(path)
     tree = run.required("criticise")
-    summary = json.loads(tree.attrs["summary"])
-    run.keep("criticise", tree, {"after": "another"}, summary)
+    run.keep("criticise", tree, {"after": "another"}, json.loads(tree.attrs["summary"]))
+
+
+def damage(path):
+    (path / "criticism.nc").write_bytes(b"cut off")
+
+
+@pytest.mark.parametrize("spoil", [of_another, damage])
+def test_a_criticism_that_is_damaged_or_of_another_posterior_does_not_count(
+    criticised, calibration, spoil
+):
+    spoil(criticised)
     for read in (latest_of, bl.Criticism.open, bl.choose_pour):
-        with pytest.raises(InputError, match="another posterior.*bolfi-liquids criticise"):
+        with pytest.raises(InputError, match=r"criticism\.nc .*bolfi-liquids criticise"):
             read(criticised)
-
-
-def test_a_damaged_criticism_does_not_count(criticised):
-    (criticised / "criticism.nc").write_bytes(b"cut off")
-    for read in (latest_of, bl.Criticism.open, bl.choose_pour):
-        with pytest.raises(InputError, match=r"criticism\.nc is damaged"):
-            read(criticised)
-
-
-def test_integers_of_numpy_are_settings():
-    assert CriticismSettings(seed=np.int64(3)).seed == 3
+    with pytest.raises(InputError, match="bolfi-liquids criticise"):
+        bl.Criticism.open(calibration.path)  # was not criticised
 
 
 def test_no_pour_is_chosen_over_a_posterior_that_is_not_the_latest(criticised):

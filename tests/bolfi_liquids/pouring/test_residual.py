@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from bolfi_liquids.criticism.pour_noise import ACTION_STEP, REPEATABILITY_SD, action_coordinates
+from bolfi_liquids.criticism.pours import ACTION_STEP, REPEATABILITY_SD, action_coordinates
 from bolfi_liquids.pouring.residual import (
     Residual,
     angle,

@@ -10,7 +10,7 @@ from PIL import Image
 import bolfi_liquids as bl
 from bolfi_liquids.reporting.films import FILM_RATE, MAX_STIR_SECONDS, N_DRAWS_SHOWN
 
-WIDTHS = {"laptop": (1280, 800), "phone": (390, 844)}
+WIDTHS = {"laptop": (1280, 800), "phone": (360, 740)}
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 pytestmark = pytest.mark.slow

@@ -5,7 +5,7 @@ from jinja2 import UndefinedError
 
 from bolfi_liquids.pouring.parcels import PARCELS
 from bolfi_liquids.reporting.prose import prose
-from bolfi_liquids.wording import LEAST_SPILLED, listed, percent, spilled, with_unit
+from bolfi_liquids.wording import LEAST_SPILLED, degrees, listed, percent, spilled, with_unit
 
 
 def test_a_fact_or_a_chapter_that_is_missing_is_refused():
@@ -27,18 +27,14 @@ def test_numbers_carry_their_units():
     assert with_unit("viscosity", 0.12345) == "0.123 Pa s"
     assert with_unit("camera_delay", 0.05) == "0.05 s"
     assert with_unit("cohesion", 0.5) == "0.5"
+    assert degrees(1.005001) == "1.01°"
     assert percent(0.0034) == "0.34 %" and percent(0.123) == "12 %" and percent(1.0) == "100 %"
-
-
-@pytest.mark.parametrize(
-    ("names", "expected"),
-    [(("a",), "a"), (("a", "b_c"), "a and b c"), (("a", "b", "c"), "a, b and c")],
-)
-def test_names_are_listed(names, expected):
-    assert listed(names) == expected
-
-
-def test_less_than_half_a_parcel_is_not_told_apart():
+    # less than half a parcel of the map is not told apart
     assert LEAST_SPILLED == 0.5 / PARCELS
     assert spilled(0.0) == spilled(0.99 * LEAST_SPILLED) != spilled(LEAST_SPILLED)
     assert spilled(0.03) == percent(0.03)
+
+
+def test_names_are_listed():
+    rows = {("a",): "a", ("a", "b_c"): "a and b c", ("a", "b", "c"): "a, b and c"}
+    assert {names: listed(names) for names in rows} == rows
