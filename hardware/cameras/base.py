@@ -4,8 +4,8 @@ from typing import Protocol
 
 import numpy as np
 
+from ..vision.camera_model import opencv
 from ..vision.frame import Frame
-from ..vision.opencv import opencv
 
 
 class CameraError(RuntimeError):

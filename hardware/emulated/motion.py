@@ -9,8 +9,8 @@ import numpy as np
 
 from ..arm import LOOKAHEAD
 from ..motion.kinematics import DhArm, forward, inverse, jacobian
+from ..motion.poses import Trajectory
 from ..motion.stir_paths import PosePath
-from ..motion.trajectory import Trajectory
 from ..robot.ur import SERVO_GAIN
 
 SERVO_RATE = 15.0  # rad/s2; the real arm's is not published

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .trajectory import Trajectory
+from .poses import Trajectory
 
 
 def star(  # noqa: PLR0913  a pattern has that many sizes

@@ -7,7 +7,7 @@ upright and leaves upwards, as in "To Stir or Not to Stir" (angular velocity and
 import numpy as np
 
 from ..rig import Rig
-from .cup_frame import cup_frame
+from .poses import cup_frame
 from .stir_paths import PosePath, placed, profile, travel, turn_rate, up_and_over
 
 RAMP_SECONDS = 0.1  # s, in which the turn reaches its angular velocity, and in which it ends

@@ -15,10 +15,9 @@ from ..board import host_time
 from ..errors import RigError
 from ..rig import Rig, View
 from ..vision.camera_model import CameraModel, as_fields, from_fields
+from ..vision.stick_view import camera_model
 from .events import EVENTS, FULL, drop_reserve, make_reserve, read_events
-from .names import frames_file, truth_file, video_file
-from .sample import SAMPLES
-from .views import camera_model
+from .samples import SAMPLES
 
 RIG = "rig.json"
 VIEWS: tuple[View, View] = ("xz", "yz")
@@ -26,6 +25,21 @@ BYTES_PER_PIXEL = 0.3  # of a noisy picture as MJPEG
 SAMPLE_BYTES = 320  # of a row of samples.csv
 WAY_TIME = 30.0  # [s] from and to where the arm waits, at the most
 SPARE_SPACE = 2.0  # times the need
+
+
+def frames_file(view: View) -> str:
+    """Name of the table of a view's frames."""
+    return f"frames_{view}.csv"
+
+
+def video_file(view: View) -> str:
+    """Name of a view's video."""
+    return f"{view}.mkv"
+
+
+def truth_file(view: View) -> str:
+    """Name of the table of what a view's rendered frames truly showed."""
+    return f"truth_{view}.csv"
 
 
 class Provenance(NamedTuple):

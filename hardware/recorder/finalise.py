@@ -9,12 +9,10 @@ import numpy as np
 
 from ..netcdf import netcdf_content
 from ..rig import Rig
-from ..vision.frame_measurement import BAD_LINE, Flag
+from ..vision.frame import BAD_LINE, Flag
 from .directory import VIEWS
-from .events import drop_reserve, read_events
-from .outcome import outcome
-from .raw import Raw, lost_rows, missed, read_raw
-from .stir import Stir, extract_stir
+from .events import drop_reserve, outcome, read_events
+from .stir import Raw, Stir, extract_stir, lost_rows, missed, read_raw
 
 if TYPE_CHECKING:
     from xarray import Dataset

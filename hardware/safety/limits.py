@@ -10,8 +10,8 @@ import numpy as np
 
 from ..arm import Tool
 from ..errors import MotionRejected
-from ..motion.cup_frame import cup_frame
 from ..motion.kinematics import ARMS, DhArm, follow, inverse
+from ..motion.poses import cup_frame
 from ..motion.stir_paths import PosePath
 from ..rig import AxisLimits, Limits, Rig
 
@@ -151,11 +151,10 @@ class TargetCheck:
     """The check of each set-point, for a driver: cheap, and the last one before the wire."""
 
     def __init__(self, rig: Rig, tool: Tool):
-        space, self._dt = workspace(rig, tool), 1.0 / rig.robot.rate
         self._frame = cup_frame(rig.cup)
-        self._box = space.box
-        self._step = rig.limits.speed * self._dt
-        self._turn = np.radians(rig.limits.tilt_rate_deg_s) * self._dt
+        self._box = workspace(rig, tool).box
+        self._step = rig.limits.speed / rig.robot.rate
+        self._turn = np.radians(rig.limits.tilt_rate_deg_s) / rig.robot.rate
 
     def __call__(self, previous: np.ndarray, target: np.ndarray) -> None:
         """Refuse a set-point that is not finite, outside the box or too far from the last.
@@ -178,11 +177,13 @@ class TargetCheck:
                 f"{'xyz'[axis]} = {position[axis]:.4f} m is outside [{low}, {high}] m", "set-point"
             )
         step = float(np.linalg.norm(target[:3] - previous[:3]))
-        if step > self._step * (1.0 + SPEED_ROUNDING) + 1e-9:
-            raise _rejected(f"a step of {step:.5f} m is above {self._step:.5f} m", "set-point")
         turn = turn_between(previous[3:], target[3:])
-        if turn > self._turn * (1.0 + SPEED_ROUNDING) + 1e-9:
-            raise _rejected(f"a turn of {turn:.5f} rad is above {self._turn:.5f} rad", "set-point")
+        for name, value, most, unit in (
+            ("step", step, self._step, "m"),
+            ("turn", turn, self._turn, "rad"),
+        ):
+            if value > most * (1.0 + SPEED_ROUNDING) + 1e-9:
+                raise _rejected(f"a {name} of {value:.5f} {unit} is above {most:.5f}", "set-point")
 
 
 def turn_between(first: np.ndarray, second: np.ndarray) -> float:

@@ -11,17 +11,15 @@ import numpy as np
 
 from ..board import Board, Who, check_can_start
 from ..errors import MotionRejected, RigError
-from ..motion.cup_frame import cup_frame
+from ..motion.poses import cup_frame
 from ..motion.stir_paths import PosePath
+from ..process import ignored_interrupts
 from ..recorder.directory import discard_directory, start_directory
-from ..recorder.events import EventLog, drop_reserve, read_events
-from ..recorder.outcome import detailed
+from ..recorder.events import EventLog, detailed, drop_reserve, read_events
 from ..robot.orders import Ask, Follow, Leave, Stop, Stopped
 from ..safety.limits import check_path
 from ..safety.preflight import Check, failures
-from ..signals import ignored_interrupts
-from .processes import Processes
-from .progress import Progress, SessionStopped, Status
+from .processes import Processes, Progress, SessionStopped, Status
 from .setup import SessionSetup
 
 END_SIGNALS = (signal.SIGTERM, signal.SIGHUP)  # Ctrl-C raises KeyboardInterrupt already

@@ -4,12 +4,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .coarse_search import Ray, Rows, sampled_rows, search_rays
-from .frame import Frame
-from .frame_measurement import Flag, FrameMeasurement, line_is_good
+from .frame import Flag, Frame, FrameMeasurement, line_is_good
 from .marker import Marker, find_marker
-from .stick_edges import Edges, find_edges
-from .stick_line import NO_LINE, Line, fit_line, moment_slope
+from .stick_line import (
+    NO_LINE,
+    Edges,
+    Line,
+    Ray,
+    Rows,
+    find_edges,
+    fit_line,
+    moment_slope,
+    sampled_rows,
+    search_rays,
+)
 from .stick_view import StickView
 
 LEAST_RESPONSE = 12.0  # grey levels

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.arm import Tool
 from bolfi_liquids.hardware.board import SPAWN, Board, Row, Who
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
 from bolfi_liquids.hardware.motion.kinematics import inverse
+from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.recorder.events import EventLog, read_events
 from bolfi_liquids.hardware.rig import Rig
-from bolfi_liquids.hardware.robot import control_loop, order_queue, ur
-from bolfi_liquids.hardware.robot.control_loop import ControlLoop, Links
-from bolfi_liquids.hardware.robot.control_process import checked
+from bolfi_liquids.hardware.robot import control_loop, ur
+from bolfi_liquids.hardware.robot import queues as order_queue
+from bolfi_liquids.hardware.robot.control_loop import ControlLoop, Links, checked
 from bolfi_liquids.hardware.robot.orders import (
     Assignment,
     Began,

@@ -2,15 +2,15 @@
 
 import cv2
 import numpy as np
-from bolfi_liquids.hardware.rendering.coverage import window_around
 from bolfi_liquids.hardware.rendering.drawing import (
     SUBPIXEL_BITS,
     Stage,
     develop,
     draw,
     fixed_point,
+    surface_share,
+    window_around,
 )
-from bolfi_liquids.hardware.rendering.stick_shape import surface_share
 from bolfi_liquids.hardware.rendering.world import WorldState, direction
 from bolfi_liquids.hardware.vision.camera_model import CameraModel
 from bolfi_liquids.hardware.vision.stick_view import Scene, circle

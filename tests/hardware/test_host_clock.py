@@ -1,6 +1,6 @@
 import time
 
-from bolfi_liquids.hardware.host_clock import RealClock
+from bolfi_liquids.hardware.process import RealClock
 from stepped_clock import SteppedClock
 
 

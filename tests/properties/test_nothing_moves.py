@@ -19,7 +19,7 @@ import pexpect
 import pytest
 import typer.main
 from bolfi_liquids.hardware.emulated.arm import EmulatedController
-from bolfi_liquids.hardware.session.confirmation import CONFIRMATION, Confirmation
+from bolfi_liquids.hardware.session.setup import CONFIRMATION, Confirmation
 from pexpect.fdpexpect import fdspawn
 
 import bolfi_liquids as bl

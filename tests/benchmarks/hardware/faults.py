@@ -25,9 +25,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bolfi_liquids.hardware.motion.stir_paths import stir
-from bolfi_liquids.hardware.recorder.events import read_events
-from bolfi_liquids.hardware.recorder.outcome import outcome
-from bolfi_liquids.hardware.recorder.sample import SAMPLES
+from bolfi_liquids.hardware.recorder.events import outcome, read_events
+from bolfi_liquids.hardware.recorder.samples import SAMPLES
 from faulty_session import small_rig
 
 sys.path.append(str(Path(__file__).parents[2] / "hardware"))

@@ -17,18 +17,19 @@ from bolfi_liquids.hardware.cameras.files import FilesCamera  # noqa: E402
 from bolfi_liquids.hardware.cameras.rendered import RenderedCamera, Timing  # noqa: E402
 from bolfi_liquids.hardware.csv_file import read_csv  # noqa: E402
 from bolfi_liquids.hardware.recorder.events import read_events  # noqa: E402
-from bolfi_liquids.hardware.recorder.rate import no_rate  # noqa: E402
 from bolfi_liquids.hardware.recorder.video import VideoWriter  # noqa: E402
-from bolfi_liquids.hardware.recorder.views import camera_model, stick_view  # noqa: E402
 from bolfi_liquids.hardware.rendering import Look, Scene  # noqa: E402
 from bolfi_liquids.hardware.rendering.drawing import prepare, render  # noqa: E402
 from bolfi_liquids.hardware.rendering.world import WorldState  # noqa: E402
 from bolfi_liquids.hardware.rig_file import bundled_rig  # noqa: E402
 from bolfi_liquids.hardware.session.camera_process import _Tally as Tally  # noqa: E402
 from bolfi_liquids.hardware.session.camera_process import run_camera, tallied  # noqa: E402
-from bolfi_liquids.hardware.vision.frame import Frame  # noqa: E402
-from bolfi_liquids.hardware.vision.frame_measurement import FrameMeasurement  # noqa: E402
+from bolfi_liquids.hardware.vision.frame import (
+    Frame,  # noqa: E402
+    FrameMeasurement,
+)
 from bolfi_liquids.hardware.vision.measuring import FrameMeter  # noqa: E402
+from bolfi_liquids.hardware.vision.stick_view import camera_model, stick_view
 from rendered_scenes import CLEAN, MovingWorld  # noqa: E402
 
 # pictures come at 30 Hz, and none may be missed; the others keep no time
@@ -349,11 +350,11 @@ def test_a_stamp_that_is_no_number_costs_no_video(tmp_path):
 
 
 def test_lost_and_repeated_pictures_are_counted():
-    tally, meter = Tally(no_rate(0.0)), FrameMeter(stick_view(RIG, "xz"))
+    tally, meter = Tally(), FrameMeter(stick_view(RIG, "xz"))
     for k, index in enumerate([0, 1, 2, 5, 6, 10]):
         image = np.full((480, 640), min(k, 3), np.uint8)
         tally = tallied(tally, meter.measure(Frame(index, k / 30, image)), 1.0 + k / 30)
-    assert (tally.rate.total, tally.lost, tally.same) == (6, 5, 3)
+    assert (tally.row.count, tally.lost, tally.same) == (6, 5, 3)
     assert tally.row.beat == pytest.approx(1.1)
     assert tally.row.worst == pytest.approx(1 / 30)
 

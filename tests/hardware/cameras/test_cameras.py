@@ -136,7 +136,7 @@ def test_a_webcam_of_another_size_is_refused(video):
 
 
 def test_without_opencv_the_extra_is_named(monkeypatch):
-    from bolfi_liquids.hardware.vision.opencv import opencv
+    from bolfi_liquids.hardware.vision.camera_model import opencv
 
     monkeypatch.setitem(sys.modules, "cv2", None)
     opencv.cache_clear()

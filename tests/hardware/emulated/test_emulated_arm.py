@@ -6,7 +6,7 @@ from bolfi_liquids.hardware import HiddenLiquid, StickMotion, bundled_rig, emula
 from bolfi_liquids.hardware.arm import LinkLost
 from bolfi_liquids.hardware.emulated.arm import FORCE_NOISE, MAX_LATENESS
 from bolfi_liquids.hardware.errors import RigError
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
+from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.robot.ur import STOP_DECELERATION
 from bolfi_liquids.hardware.safety.guards import PLAYING

@@ -10,7 +10,7 @@ from bolfi_liquids.hardware import Session, SessionSetup, SessionStopped, emulat
 from bolfi_liquids.hardware.emulated.rig import patient
 from bolfi_liquids.hardware.motion.pour_paths import pour_path, ready_to_pour
 from bolfi_liquids.hardware.motion.stir_paths import retract, stir
-from bolfi_liquids.hardware.recorder.sample import SAMPLES
+from bolfi_liquids.hardware.recorder.samples import SAMPLES
 from bolfi_liquids.hardware.robot.orders import (
     Assignment,
     Began,

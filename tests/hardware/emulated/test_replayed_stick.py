@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware import bundled_rig
 from bolfi_liquids.hardware.emulated.motion import servoed
-from bolfi_liquids.hardware.emulated.replayed_stick import (
+from bolfi_liquids.hardware.emulated.stick import (
     FADE,
     NEAR,
+    StickMotion,
     advance,
     angles,
+    checked,
     init,
 )
-from bolfi_liquids.hardware.emulated.stick_motion import StickMotion, checked
 from bolfi_liquids.hardware.motion import PosePath, joined, star, strokes
 
 DT = 0.008

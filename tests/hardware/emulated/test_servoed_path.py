@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware import bundled_rig, emulated, servoed
 from bolfi_liquids.hardware.motion import stir
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
+from bolfi_liquids.hardware.motion.poses import cup_frame
 from stepped_clock import SteppedClock
 
 RIG = bundled_rig()

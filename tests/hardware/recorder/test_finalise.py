@@ -17,12 +17,11 @@ from bolfi_liquids.hardware.recorder.directory import (
     rig_hash,
     start_directory,
 )
-from bolfi_liquids.hardware.recorder.events import RESERVE
+from bolfi_liquids.hardware.recorder.events import RESERVE, outcome
 from bolfi_liquids.hardware.recorder.finalise import finalise, partial
-from bolfi_liquids.hardware.recorder.outcome import outcome
-from bolfi_liquids.hardware.recorder.raw import robot_time
-from bolfi_liquids.hardware.recorder.views import camera_model
-from bolfi_liquids.hardware.vision.frame_measurement import Flag
+from bolfi_liquids.hardware.recorder.stir import robot_time
+from bolfi_liquids.hardware.vision.frame import Flag
+from bolfi_liquids.hardware.vision.stick_view import camera_model
 from closed_form_session import (
     COMPLETED,
     DELAY,

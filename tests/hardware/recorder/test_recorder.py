@@ -19,9 +19,7 @@ from bolfi_liquids.hardware.recorder.events import (
     make_reserve,
     read_events,
 )
-from bolfi_liquids.hardware.recorder.process import run_recorder
-from bolfi_liquids.hardware.recorder.rate import counted, no_rate
-from bolfi_liquids.hardware.recorder.sample import SAMPLES, Sample
+from bolfi_liquids.hardware.recorder.samples import SAMPLES, Sample, run_recorder
 
 FIELDS = ("index", "value")
 
@@ -175,14 +173,6 @@ def test_an_event_that_was_cut_by_a_full_disk_is_written_again(tmp_path, monkeyp
     log.write("last")
     log.close()
     assert [event["kind"] for event in read_events(tmp_path)] == ["first", "stopped", "last"]
-
-
-def test_the_rate_is_that_of_the_last_second():
-    rate = no_rate(100.0)
-    for k in range(1, 301):
-        rate = counted(rate, 2, 100.0 + k / 100)
-    assert (rate.total, rate.rate) == (600, pytest.approx(200.0, rel=0.02))
-    assert counted(rate, 0, 110.0).rate < 30.0
 
 
 @pytest.mark.punctual  # it says at once whether it lives, and ends at once

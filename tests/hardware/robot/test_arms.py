@@ -5,7 +5,7 @@ import pytest
 from bolfi_liquids.hardware import bundled_rig, emulated
 from bolfi_liquids.hardware.arm import LOOKAHEAD, WATCHDOG_PERIOD, LinkLost
 from bolfi_liquids.hardware.errors import MotionRejected
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
+from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.robot.ur import URController
 from bolfi_liquids.hardware.safety.guards import NORMAL, PLAYING, RUNNING_MODE

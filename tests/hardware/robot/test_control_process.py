@@ -5,16 +5,14 @@ import time
 import numpy as np
 import pytest
 from bolfi_liquids.hardware.board import SPAWN, Board, Row, Who, host_time
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
 from bolfi_liquids.hardware.motion.kinematics import forward, inverse
+from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.motion.pour_paths import approach_pour, pour_path, ready_to_pour
 from bolfi_liquids.hardware.motion.stir_paths import insert, stir
 from bolfi_liquids.hardware.recorder.events import read_events
-from bolfi_liquids.hardware.recorder.sample import Sample
+from bolfi_liquids.hardware.recorder.samples import Sample
 from bolfi_liquids.hardware.rig_file import bundled_rig
-from bolfi_liquids.hardware.robot.control_loop import WATCHDOG_PERIOD, refused
-from bolfi_liquids.hardware.robot.control_process import run_control
-from bolfi_liquids.hardware.robot.order_queue import Inbox, Vetting
+from bolfi_liquids.hardware.robot.control_loop import WATCHDOG_PERIOD, refused, run_control
 from bolfi_liquids.hardware.robot.orders import (
     Ask,
     Assignment,
@@ -29,8 +27,16 @@ from bolfi_liquids.hardware.robot.orders import (
     Told,
     fingerprint,
 )
-from bolfi_liquids.hardware.robot.path_queue import Course, Leg, Trail, advanced, queued
-from bolfi_liquids.hardware.robot.sample_queue import Outlet
+from bolfi_liquids.hardware.robot.queues import (
+    Course,
+    Inbox,
+    Leg,
+    Outlet,
+    Trail,
+    Vetting,
+    advanced,
+    queued,
+)
 from bolfi_liquids.hardware.robot.ur import URController
 from bolfi_liquids.hardware.safety.guards import Trip
 from bolfi_liquids.hardware.safety.limits import workspace

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.arm import LinkLost
 from bolfi_liquids.hardware.errors import MotionRejected, RigError
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
+from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.robot.ur import URArm, URReader
@@ -102,8 +102,10 @@ def test_taking_control_sets_tool_and_payload_and_moves_nothing(arm, emulator):
     assert emulator.admin.motions() == 0
 
 
-def test_the_lip_becomes_the_tool_s_centre(arm):
-    arm.mount(RIG.robot.pouring_tcp)
+def test_the_lip_becomes_the_tool_s_centre(emulator):
+    arm = URArm(RIG, emulator.address, "pouring")
+    arm.connect()
+    arm.take_control()
     assert arm.tcp() == pytest.approx(RIG.robot.pouring_tcp, abs=1e-9)
 
 
@@ -180,7 +182,7 @@ def test_a_protective_stop_is_told_and_takes_no_set_point(arm, emulator):
 # in a process of its own, which the library may crash
 DROPPED = """
 import os, sys, time
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
+from bolfi_liquids.hardware.motion.poses import cup_frame
 from ur_controller.admin_client import Admin
 from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.rig_file import bundled_rig

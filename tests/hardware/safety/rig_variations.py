@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 from bolfi_liquids.hardware.errors import MotionRejected, RigError
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
+from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.motion.pour_paths import (
     approach_pour,
     pour_path,

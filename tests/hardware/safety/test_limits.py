@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 from bolfi_liquids.hardware.errors import MotionRejected
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
 from bolfi_liquids.hardware.motion.kinematics import UR10, forward, inverse
+from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.motion.pour_paths import pour_path
 from bolfi_liquids.hardware.motion.stir_paths import (
     PosePath,

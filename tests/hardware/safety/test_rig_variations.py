@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
+from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.motion.stir_paths import insert
 from bolfi_liquids.hardware.rig_file import open_rig
 from bolfi_liquids.hardware.robot.orders import Checked, Done, Follow, Leave

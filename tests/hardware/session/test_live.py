@@ -4,7 +4,7 @@ import pytest
 from bolfi_liquids.hardware.board import Row, Trouble, Who
 from bolfi_liquids.hardware.robot.orders import Stopped
 from bolfi_liquids.hardware.session.live import Reading, live_table
-from bolfi_liquids.hardware.session.progress import Status
+from bolfi_liquids.hardware.session.processes import Status
 from rich.console import Console
 
 ROWS = (

@@ -12,17 +12,17 @@ import pytest
 from bolfi_liquids.hardware.errors import MotionRejected, RigError
 from bolfi_liquids.hardware.motion.stir_paths import insert, retract, stir
 from bolfi_liquids.hardware.recorder.events import read_events
-from bolfi_liquids.hardware.recorder.sample import SAMPLES
+from bolfi_liquids.hardware.recorder.samples import SAMPLES
 from bolfi_liquids.hardware.robot.ur import URController
 from bolfi_liquids.hardware.safety.preflight import failures
-from bolfi_liquids.hardware.session.confirmation import (
+from bolfi_liquids.hardware.session.session import Session, SessionStopped
+from bolfi_liquids.hardware.session.setup import (
     CONFIRMATION,
     Confirmation,
+    SessionSetup,
     confirm,
     describe,
 )
-from bolfi_liquids.hardware.session.session import Session, SessionStopped
-from bolfi_liquids.hardware.session.setup import SessionSetup
 from short_rig import short_rig
 from ur_controller.patience import PatientSetup
 from ur_controller.process import FOLDER, ControllerProcess
@@ -233,7 +233,7 @@ from pathlib import Path
 from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.robot.ur import URController
-from bolfi_liquids.hardware.session.confirmation import CONFIRMATION, confirm
+from bolfi_liquids.hardware.session.setup import CONFIRMATION, confirm
 from bolfi_liquids.hardware.session.session import Session
 from short_rig import short_rig
 from ur_controller.patience import PatientSetup

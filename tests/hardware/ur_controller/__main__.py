@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 
 from bolfi_liquids.hardware.errors import RigError
-from bolfi_liquids.hardware.priority import hurry
+from bolfi_liquids.hardware.process import hurry
 
 from .controller import HOME_JOINTS, MODELS, Options
 from .loop import ControllerServer

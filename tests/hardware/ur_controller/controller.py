@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from bolfi_liquids.hardware.emulated.arm import PROTECTIVE_BITS, PROTECTIVE_STOP, STOPPED
 from bolfi_liquids.hardware.emulated.motion import KinematicArm, MotionError
-from bolfi_liquids.hardware.host_clock import REAL_CLOCK, HostClock
 from bolfi_liquids.hardware.motion.kinematics import ARMS
+from bolfi_liquids.hardware.process import REAL_CLOCK, HostClock
 from bolfi_liquids.hardware.safety.guards import NORMAL, PLAYING
 
 from .force import ForceReading

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable
 
 from bolfi_liquids.hardware.emulated.arm import MAX_LATENESS
-from bolfi_liquids.hardware.host_clock import REAL_CLOCK, HostClock
+from bolfi_liquids.hardware.process import REAL_CLOCK, HostClock
 
 from .admin import AdminSession, Faults
 from .controller import Controller, Options

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from bolfi_liquids.hardware.errors import RigError
-from bolfi_liquids.hardware.host_clock import REAL_CLOCK, HostClock
+from bolfi_liquids.hardware.process import REAL_CLOCK, HostClock
 
 MOST_UNSENT = 1 << 18  # bytes; a client that reads no more than this loses what comes later
 RTDE, SCRIPT, DASHBOARD, ADMIN = 30004, 30003, 29999, 29997

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 from bolfi_liquids.hardware.errors import RigError
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
 from bolfi_liquids.hardware.motion.kinematics import inverse
+from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.rig import Rig
 from bolfi_liquids.hardware.safety.limits import Tool, workspace
 
