@@ -29,20 +29,10 @@ from bolfi_liquids.hardware.safety.limits import workspace
 
 sys.path.insert(0, str(Path(__file__).parent))
 from stepped_clock import SteppedClock  # noqa: E402
-from ur_controller.controller import Options  # noqa: E402
-from ur_controller.stepped import SteppedController, library  # noqa: E402
+from ur_controller.machine import Options  # noqa: E402
+from ur_controller.stepped import AtOnce, SteppedController, library  # noqa: E402
 
 LONGEST = 120.0  # s of the stepped clock, after which a test has failed
-
-
-class AtOnce:
-    """In place of the driver's thread, which has nothing to wait for here."""
-
-    def __init__(self, target: Callable[[], None], **_: object):
-        self.start = target
-
-    def join(self, _: float) -> None:
-        """Nothing is left to wait for."""
 
 
 class Orders:
@@ -170,17 +160,14 @@ class SteppedControl:
 @pytest.fixture
 def step_emulator(monkeypatch):
     """Makes a `SteppedController`, and ur_rtde's modules are its clients."""
-    running: list[SteppedController] = []
 
     def make(clock: SteppedClock, **options):
-        running.append(emulator := SteppedController(Options(**options), clock))
+        emulator = SteppedController(Options(**options), clock)
         for module in ("rtde_receive", "rtde_control"):
             monkeypatch.setitem(sys.modules, module, library(emulator))
         return emulator
 
-    yield make
-    for one in running:
-        one.close()
+    return make
 
 
 @pytest.fixture

@@ -89,7 +89,7 @@ def test_a_session_follows_paths_records_them_and_leaves_nothing_behind(emulator
         start = time.monotonic()
     assert time.monotonic() - start < 1.5
     assert not any(lives(pid) for pid in pids)
-    assert emulator.admin.state().at_rest
+    assert emulator.admin.state().resting
     assert kinds(tmp_path, "control")[-5:] == ["began", "done", "began", "done", "left"]
     rows = (tmp_path / SAMPLES).read_text().splitlines()
     assert [int(row.split(",")[0]) for row in rows[1:]] == list(range(len(rows) - 1))
@@ -186,9 +186,9 @@ def test_an_exception_stops_the_arm_and_is_the_reason(emulator, tmp_path):
     with pytest.raises(ZeroDivisionError):
         with armed(emulator, tmp_path) as session:
             begin(session)
-            assert not emulator.admin.state().at_rest
+            assert not emulator.admin.state().resting
             raise ZeroDivisionError("oh")
-    assert emulator.admin.state().at_rest
+    assert emulator.admin.state().resting
     (event,) = [event for event in read_events(tmp_path) if event["kind"] == "stopped"]
     assert "ZeroDivisionError in the main process: oh" in event["reason"]
 
@@ -213,7 +213,7 @@ def test_a_control_process_that_hangs_is_ended(emulator, tmp_path):
         os.kill(session._processes.control.process.pid, signal.SIGSTOP)
         with pytest.raises(SessionStopped, match="no sign of life of the control process"):
             session.wait(timeout=5.0)
-    assert emulator.admin.state().at_rest
+    assert emulator.admin.state().resting
 
 
 def test_no_controller_is_a_line_of_the_list(tmp_path):
@@ -266,10 +266,10 @@ def test_however_main_ends_the_arm_stops(emulator, tmp_path, way):
     command = [sys.executable, str(script), emulator.address, way, str(recording)]
     subprocess.run(command, timeout=60.0, stderr=subprocess.DEVNULL, check=False, env=FINDING)
     end = time.monotonic() + 10.0
-    while time.monotonic() < end and not emulator.admin.state().at_rest:
+    while time.monotonic() < end and not emulator.admin.state().resting:
         time.sleep(0.02)
     assert emulator.admin.motions() > 0
-    assert emulator.admin.state().at_rest
+    assert emulator.admin.state().resting
     assert "stopped" in kinds(recording, "control")
 
 
