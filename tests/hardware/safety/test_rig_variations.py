@@ -34,10 +34,10 @@ def test_the_walk_finds_the_numbers_of_all_sections():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factor", FACTORS)
 @pytest.mark.parametrize("field", NUMBERS, ids=name_of)
-def test_a_wrong_number_is_refused_or_harmless(field, factor, tmp_path):
-    outcome(field, NUMBERS[field], factor, tmp_path)
+def test_a_wrong_number_is_refused_or_harmless(field, tmp_path):
+    for factor in FACTORS:
+        outcome(field, NUMBERS[field], factor, tmp_path)
 
 
 def test_the_template_itself_is_not_refused():
@@ -45,24 +45,17 @@ def test_the_template_itself_is_not_refused():
     assert planned(TEMPLATE) == "harmless"
 
 
-SPOILED = {
-    "faster": lambda path: path._replace(time=path.time / 4.0),
-    "aside": lambda path: path._replace(pose=path.pose + [0.05, 0.0, 0.0, 0.0, 0.0, 0.0]),
-    "upside down": lambda path: path._replace(pose=path.pose * [1, 1, 1, 0, 0, 0]),
-    "not at all": lambda path: path,
-}
-
-
-@pytest.mark.parametrize("how", SPOILED)
-def test_a_harmful_path_is_found(how):
-    strokes = [path for tool, path in stirs(TEMPLATE)]
-    harmed = 0
-    for path in strokes:
-        try:
-            judge(SPOILED[how](path), TEMPLATE, "stirring")
-        except AssertionError:
-            harmed += 1
-    assert (harmed > 0) == (how != "not at all")
+def test_a_harmful_path_is_found():
+    spoiled = (
+        lambda path: path._replace(time=path.time / 4.0),  # faster
+        lambda path: path._replace(pose=path.pose + [0.05, 0.0, 0.0, 0.0, 0.0, 0.0]),  # aside
+        lambda path: path._replace(pose=path.pose * [1, 1, 1, 0, 0, 0]),  # upside down
+    )
+    strokes = [path for _, path in stirs(TEMPLATE)]
+    for spoil in spoiled:
+        with pytest.raises(AssertionError):
+            for path in strokes:
+                judge(spoil(path), TEMPLATE, "stirring")
 
 
 DANGEROUS = [  # seen at the first full state
@@ -90,22 +83,20 @@ def test_what_cannot_be_is_refused_with_its_field(where, name, value, tmp_path):
     assert f"{path}: {where}" in said and "\n" not in said
 
 
-@pytest.mark.parametrize("heading", [-160.0, -90.0, 90.0, 170.0])
-def test_a_cup_that_turns_away_from_the_receiver_is_refused(heading, tmp_path):
+def test_a_cup_that_turns_away_from_the_receiver_is_refused(tmp_path):
     path = tmp_path / "rig.toml"
-    path.write_text(tomli_w.dumps(changed(("pouring", "heading_deg"), heading)))
-    with pytest.raises(ValueError, match="receiver"):
-        open_rig(path)
+    for heading in (-160.0, -90.0, 90.0, 170.0):
+        path.write_text(tomli_w.dumps(changed(("pouring", "heading_deg"), heading)))
+        with pytest.raises(ValueError, match="receiver"):
+            open_rig(path)
 
 
-@pytest.mark.parametrize(
-    "field", [("liquid", "density"), ("cup", "yaw_deg"), ("robot", "start", 0)], ids=name_of
-)
-def test_nan_is_no_number(field, tmp_path):
+def test_nan_is_no_number(tmp_path):
     path = tmp_path / "rig.toml"
-    path.write_text(tomli_w.dumps(changed(field, float("nan"))))
-    with pytest.raises(ValueError, match=field[1]):
-        open_rig(path)
+    for field in (("liquid", "density"), ("cup", "yaw_deg"), ("robot", "start", 0)):
+        path.write_text(tomli_w.dumps(changed(field, float("nan"))))
+        with pytest.raises(ValueError, match=field[1]):
+            open_rig(path)
 
 
 MOVED = [("stirring", "approach_speed"), ("stirring", "acceleration"), ("robot", "start", 5)]
