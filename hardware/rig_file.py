@@ -181,15 +181,15 @@ def _receiver(rig: Rig) -> Rules:
 
 
 def _speeds(rig: Rig) -> Rules:
-    for field, limit in (
-        ("stirring.speed", "speed"),
-        ("stirring.approach_speed", "speed"),
-        ("pouring.approach_speed", "speed"),
-        ("stirring.acceleration", "acceleration"),
+    for field, limit, unit in (
+        ("stirring.speed", "speed", "m/s"),
+        ("stirring.approach_speed", "speed", "m/s"),
+        ("pouring.approach_speed", "speed", "m/s"),
+        ("stirring.acceleration", "acceleration", "m/s2"),
     ):
         section, _, name = field.partition(".")
         value, most = getattr(getattr(rig, section), name), getattr(rig.limits, limit)
-        yield value > most, field, f"{value} is above limits.{limit} {most}"
+        yield value > most, field, f"{value} {unit} is above limits.{limit} {most} {unit}"
 
 
 def _stick(rig: Rig) -> Rules:

@@ -45,18 +45,17 @@ def checked(motion: StickMotion) -> StickMotion:
     Raises:
         ValueError: Shapes do not agree, a number is not finite, or times do not rise.
     """
-    size = len(motion.time)
+    size, parts = len(motion.time), motion._asdict()
     shapes = tuple(np.shape(part) for part in motion)
-    if size < 2 or shapes != ((size,), (size, 3), (size, 2)):
-        raise ValueError(
-            f"a stick's motion has times, pivots and inclinations of shapes {shapes}; "
-            "give (T,), (T, 3) and (T, 2) of at least two rows"
-        )
-    for name, values in motion._asdict().items():
-        if not np.isfinite(values).all():
-            raise ValueError(f"a stick's motion has a {name} that is not finite; give numbers only")
-    if not (np.diff(motion.time) > 0.0).all():
-        raise ValueError("the times of a stick's motion do not rise; sort its rows")
+    fine = size > 1 and shapes == ((size,), (size, 3), (size, 2))
+    faults = {f"shapes {shapes}; give (T,), (T, 3) and (T, 2) of at least two rows": not fine}
+    faults |= {
+        f"a {name} that is not finite; give numbers only": not np.isfinite(values).all()
+        for name, values in parts.items()
+    }
+    faults["times that do not rise; sort its rows"] = not (np.diff(motion.time) > 0.0).all()
+    for fault in (what for what, found in faults.items() if found):
+        raise ValueError(f"a stick's motion has {fault}")
     return motion
 
 
