@@ -42,7 +42,7 @@ class Who(IntEnum):
 
 
 class Trouble(IntEnum):
-    """What a participant complains of."""
+    """Trouble of a participant."""
 
     NONE = 0
     WRITE_FAILED = 1
@@ -53,7 +53,7 @@ class Trouble(IntEnum):
 
     @property
     def kind(self) -> str:
-        """Of the event that tells of it."""
+        """Kind of the event that tells of it."""
         return self.name.lower()
 
 

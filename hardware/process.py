@@ -1,4 +1,4 @@
-"""What every process of a session needs: a clock, a priority, no signals of a terminal."""
+"""Clock, priority and signals of the processes of a session."""
 
 import gc
 import os

@@ -199,7 +199,7 @@ class StickSettings(RigSection, frozen=True):
 
 
 class LiquidSettings(RigSection, frozen=True):
-    """What is known of the liquid before it is stirred: its weighed density [kg/m3]."""
+    """The liquid before it is stirred: its weighed density [kg/m3]."""
 
     density: Annotated[float, Within(50.0, 20_000.0, "kg/m3", "no liquid is as light or as heavy")]
 
@@ -299,7 +299,7 @@ class Camera(RigSection, frozen=True):
 
 
 class PouringSettings(RigSection, frozen=True):
-    """Where a pour happens, in the base frame.
+    """Place of a pour, in the base frame.
 
     Attributes:
         receiver: Centre of the receiver's floor [m].
@@ -358,7 +358,7 @@ class PouringBox(AxisLimits, frozen=True):
 
 
 class Limits(RigSection, frozen=True):
-    """What a commanded motion and a running one must keep; a person may set them lower.
+    """Limits of a commanded motion and of a running one; a person may set them lower.
 
     Attributes:
         stirring: Where the pivot may go.

@@ -128,7 +128,7 @@ def _beside(rig: Rig, directory: Path) -> Rig:
 
 
 class Clearance(NamedTuple):
-    """How far the cup may stand from where a rig's file puts it before the stick meets it [m].
+    """Distances [m] by which the cup may be misplaced before the stick meets it.
 
     Attributes:
         aside: From the stick at a vertex of the star to the cup's wall.
@@ -141,7 +141,7 @@ class Clearance(NamedTuple):
 
 
 def clearance(rig: Rig) -> Clearance:
-    """Of the stick of a rig, on all ways that are planned with it; both are positive."""
+    """Clearance of a rig's stick on all ways that are planned with it; both are positive."""
     cup, stick, plan = rig.cup, rig.stick, rig.stirring
     floor = plan.height - stick.length
     rim = plan.clear_height - stick.length - cup.height
@@ -341,5 +341,5 @@ def _turns(space: Workspace) -> dict[str, np.ndarray]:
 
 
 def _angle(first: np.ndarray, second: "np.ndarray | tuple[float, ...]") -> float:
-    """Between two directions of length 1 [rad]."""
+    """Angle between two directions of length 1 [rad]."""
     return float(np.arccos(np.clip(np.dot(first, second), -1.0, 1.0)))

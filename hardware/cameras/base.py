@@ -1,4 +1,4 @@
-"""What every camera gives: frames with the time at which it gave them."""
+"""Protocol of cameras: frames with the time at which a camera gave them."""
 
 from typing import Protocol
 

@@ -30,7 +30,7 @@ STALL_SECONDS = 1.0  # s, in which neither the arm nor its cameras move on
 
 @dataclass(frozen=True)
 class HiddenLiquid:
-    """What the emulated stick dips into; its density is the rig's.
+    """Liquid into which the emulated stick dips; its density is the rig's.
 
     Attributes:
         viscosity: Dynamic [Pa s].

@@ -90,7 +90,7 @@ def matrix_pose(matrix: np.ndarray) -> np.ndarray:
 
 
 class CupFrame(NamedTuple):
-    """Where the cup stands: origin [m], shape (3,), and axes (columns), in the base frame."""
+    """Place of the cup: origin [m], shape (3,), and axes (columns), in the base frame."""
 
     origin: np.ndarray
     axes: np.ndarray
@@ -105,7 +105,7 @@ class CupFrame(NamedTuple):
         return np.concatenate([self.origin + pose[..., :3] @ self.axes.T, pose[..., 3:]], axis=-1)
 
     def from_base(self, pose: np.ndarray) -> np.ndarray:
-        """Undoes `to_base`."""
+        """Undo `to_base`."""
         return np.concatenate([(pose[..., :3] - self.origin) @ self.axes, pose[..., 3:]], axis=-1)
 
 

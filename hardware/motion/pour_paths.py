@@ -34,7 +34,7 @@ def ready_to_pour(rig: Rig, distance: float, lip_height: float) -> np.ndarray:
 
 
 def approach_pour(rig: Rig, pose: np.ndarray, *, distance: float, lip_height: float) -> PosePath:
-    """From where the lip is to `ready_to_pour`: straight up, then sideways, then down.
+    """Path of the lip to `ready_to_pour`: straight up, then sideways, then down.
 
     Args:
         rig: What is known of the place.

@@ -43,7 +43,7 @@ def truth_file(view: View) -> str:
 
 
 class Provenance(NamedTuple):
-    """What a directory's rig.json tells.
+    """Content of a directory's rig.json.
 
     Attributes:
         rig: The rig that was recorded.
@@ -141,7 +141,7 @@ def rig_hash(rig: Rig) -> str:
 
 
 def expected_bytes(rig: Rig, duration: float, *, videos: bool = True) -> float:
-    """What a recording that lasts `duration` [s] may need on the disk."""
+    """Bytes that a recording of `duration` [s] may need on the disk."""
     cameras = rig.cameras if videos else ()
     pixels = sum(camera.width * camera.height * camera.rate for camera in cameras)
     per_second = BYTES_PER_PIXEL * pixels + SAMPLE_BYTES * rig.robot.rate
@@ -149,7 +149,7 @@ def expected_bytes(rig: Rig, duration: float, *, videos: bool = True) -> float:
 
 
 def read_provenance(directory: Path) -> Provenance:
-    """What `start_directory` wrote.
+    """Read what `start_directory` wrote.
 
     Raises:
         RigError: There is no rig.json, or it is damaged.
@@ -166,15 +166,11 @@ def read_provenance(directory: Path) -> Provenance:
             started=written["started"],
             extra=written["extra"],
         )
-    except FileNotFoundError as err:
-        raise RigError(
-            f"no {RIG}", where=str(directory), fix="give the directory of a recording"
-        ) from err
     except (OSError, ValueError, ValidationError, KeyError, TypeError) as err:
         raise RigError(
             f"cannot be used ({type(err).__name__}: {err})",
             where=str(path),
-            fix="restore it: no recording can be made without it",
+            fix="give the directory of a recording, or restore it: none can be made without it",
         ) from err
 
 

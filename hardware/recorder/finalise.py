@@ -61,7 +61,7 @@ def partial(directory: str | Path, until: float = np.inf) -> Stir:
 
 
 def rig_attributes(rig: Rig) -> dict[str, float]:
-    """What a recording tells of its rig: lengths [m], mass [kg], density [kg/m3], speed [m/s]."""
+    """Attributes that a rig gives: lengths [m], mass [kg], density [kg/m3], speed [m/s]."""
     return {
         "cup_radius": rig.cup.radius,
         "cup_height": rig.cup.height,

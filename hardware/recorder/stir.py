@@ -91,12 +91,12 @@ def robot_time(
 
 
 def lost_rows(index: NDArray[np.float64]) -> int:
-    """How many rows are missing from a table: what its rising index leaves out, shape (N,)."""
+    """Number of rows that are missing from a table: gaps of its rising index, shape (N,)."""
     return int(index[-1] - index[0] + 1 - len(index))
 
 
 def missed(clock: NDArray[np.float64]) -> int:
-    """How many times a source's clock leaves out: what it sent and nobody fetched.
+    """Number of times that a source's clock leaves out: it sent, and nobody fetched.
 
     A camera's queue drops old pictures, and a controller's client keeps only the newest package:
     a computer that stands still for longer than their period misses some.
@@ -166,7 +166,7 @@ class Stir(NamedTuple):
 
 
 class Span(NamedTuple):
-    """Of the robot's time [s], and why it ends before the stir does."""
+    """Span of the robot's time [s], and why it ends before the stir does."""
 
     first: float
     last: float
@@ -216,7 +216,7 @@ def _in_gap(time: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np
 
 
 def _stirred(samples: Columns, where: str, until: float) -> Span:
-    """From the first to the last sample of the stir, or up to a gap between them."""
+    """Span from the first to the last sample of the stir, or up to a gap between them."""
     time = samples["time"]
     stirring = np.flatnonzero((samples["stirring"] == 1) & (time <= until))
     if len(stirring) == 0:

@@ -16,7 +16,7 @@ SUB_EXPOSURES = 3
 
 @dataclass(frozen=True)
 class Look:
-    """How the picture looks; grey levels are 0 to 255.
+    """Look of a picture; grey levels are 0 to 255.
 
     Attributes:
         background: Mean grey level behind everything.

@@ -87,7 +87,7 @@ def _nearer(age: float, period: float) -> float:
 
 
 class Links(NamedTuple):
-    """What the loop is joined to.
+    """Connections of the loop.
 
     Attributes:
         board: Where the processes leave signs of life.
@@ -246,7 +246,7 @@ class ControlLoop:
         return None
 
     def _cause(self) -> Trip | None:
-        """What the controller says of why it takes no set-points, if it does so at once."""
+        """Why the controller takes no set-points, if it says so within `CAUSE_PERIODS`."""
         end = self._clock.now() + CAUSE_PERIODS * self._period
         while self._clock.now() < end:
             self._clock.sleep(0.25 * self._period)

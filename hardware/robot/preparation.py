@@ -27,7 +27,7 @@ WAIT_FOR_OTHERS = 15.0  # s, for recorder and cameras to show signs of life
 
 
 class Prepared(NamedTuple):
-    """What the list said.
+    """The pre-flight list, and the arm that it is about.
 
     Attributes:
         reader: Of the arm; connected, as far as that went.

@@ -1,4 +1,4 @@
-"""What waits for the motion loop, orders and paths, and behind it, samples; it never waits."""
+"""Queues before the motion loop, orders and paths, and behind it, samples; it never waits."""
 
 import select
 from collections import deque
@@ -42,7 +42,7 @@ class Leg(NamedTuple):
 
 
 class Course(NamedTuple):
-    """What is commanded now: sample `at` of `leg`, or the pose `hold` when there is none.
+    """Current command: sample `at` of `leg`, or the pose `hold` when there is none.
 
     Attributes:
         hold: Latest set-point in the base frame, shape (6,).
@@ -58,7 +58,7 @@ class Course(NamedTuple):
 
 
 class LegChange(NamedTuple):
-    """What a period brought: the path that ended, the path that began."""
+    """Change of a period: the path that ended, the path that began."""
 
     done: Leg | None
     began: Leg | None

@@ -166,7 +166,7 @@ class URArm(URReader, PathFollower):
         return bool(self._control.isPoseWithinSafetyLimits(list(pose)))
 
     def arm_watchdog(self) -> None:
-        """From now on the controller ends its program 0.1 s after the last set-point.
+        """Make the controller end its program 0.1 s after the last set-point.
 
         An upload would disarm it; none follows.
 

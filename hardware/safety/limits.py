@@ -1,4 +1,4 @@
-"""What a motion must keep before it may begin, and each of its set-points on the way.
+"""Limits of a motion before it may begin, and of each of its set-points on the way.
 
 A path that breaks a limit is refused as a whole; nothing is clipped.
 """
@@ -28,7 +28,7 @@ Refusals = Iterable[tuple[bool, str, str]]  # whether it is refused, what is wro
 
 
 class Workspace(NamedTuple):
-    """Where one tool may go and which arm carries it.
+    """Range of one tool, and the arm that carries it.
 
     Attributes:
         box: Range of the tool's centre, in the cup's frame.
@@ -48,7 +48,7 @@ class Workspace(NamedTuple):
 
 
 def workspace(rig: Rig, tool: Tool) -> Workspace:
-    """What a rig's file says about one of its two tools."""
+    """Workspace of one of a rig's two tools."""
     robot = rig.robot
     return Workspace(
         box=getattr(rig.limits, tool),
@@ -145,7 +145,7 @@ def _part(path: PosePath, start: int) -> _Part:
 
 
 def margin(speed: np.ndarray | float, limits: Limits) -> np.ndarray | float:
-    """How far the arm still goes after a stop is ordered at `speed` [m/s], in [m]."""
+    """Way [m] that the arm still goes after a stop is ordered at `speed` [m/s]."""
     return speed**2 / (2.0 * limits.acceleration) + speed * limits.latency
 
 

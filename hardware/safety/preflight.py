@@ -1,4 +1,4 @@
-"""What must be true before an arm may move (S3), as a list that a person can read."""
+"""Conditions of a motion (S3), as a list that a person can read."""
 
 import shutil
 from collections.abc import Mapping
@@ -36,7 +36,7 @@ class Check(NamedTuple):
 
 
 def arm_checks(states: list[ArmState], rig: Rig) -> list[Check]:
-    """What a look at the arm tells, armed or not.
+    """Checks by a look at the arm, armed or not.
 
     Args:
         states: Read one after the other for some tenths of a second, the arm at rest.

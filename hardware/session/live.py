@@ -1,4 +1,4 @@
-"""What an operator sees while the arm moves."""
+"""The operator's view while the arm moves."""
 
 from collections.abc import Mapping
 

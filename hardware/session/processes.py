@@ -51,7 +51,7 @@ class SessionInterrupted(SessionStopped):
 
 
 class Status(NamedTuple):
-    """What an operator wants to know.
+    """State of a session for its operator.
 
     Attributes:
         rows: The board's, by participant.
@@ -74,7 +74,7 @@ class Status(NamedTuple):
 
 @dataclass
 class Progress:
-    """What was ordered and what was reported; written under `writing`, read from any thread.
+    """Orders and reports of a session; written under `writing`, read from any thread.
 
     Attributes:
         writing: Held by whoever writes.
@@ -162,7 +162,7 @@ def start(
 
 
 def ended_how(child: Child) -> str:
-    """How a process that is no more has ended."""
+    """End of a process that is no more, in words."""
     code = child.process.exitcode
     if code is not None and code < 0:
         return f"{child.name} process killed by {signal.Signals(-code).name}"

@@ -1,4 +1,4 @@
-"""What of a rig works and what is missing, without moving anything."""
+"""Check of a rig: what works and what is missing; nothing moves."""
 
 import socket
 from collections.abc import Callable, Iterator

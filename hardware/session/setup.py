@@ -1,4 +1,4 @@
-"""What a session is for, and whether it may move the arm: a typed sentence allows that (S1)."""
+"""Set-up of a session, and leave to move the arm, which a typed sentence alone gives (S1)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -140,7 +140,7 @@ class SessionSetup:
 
     @property
     def controller(self) -> Controller:
-        """What opens the arm."""
+        """Opens the arm."""
         return URController(self.rig.robot.host) if self.arm is None else self.arm
 
     @property
@@ -148,11 +148,6 @@ class SessionSetup:
         """Whether the arm is emulated: no confirmation is needed, and guards tolerate stalls."""
         # no other class may say so of itself: this is what spares the confirmation
         return type(self.arm) is EmulatedController
-
-    @property
-    def duration(self) -> float:
-        """Of the plan [s]."""
-        return sum(path.duration for path in self.plan)
 
     @cached_property
     def guarded_rig(self) -> Rig:
@@ -165,7 +160,7 @@ class SessionSetup:
         return patient(rig) if self.rehearsal else rig
 
     def assignment(self) -> Assignment:
-        """What the control process is for."""
+        """Task of the control process."""
         return Assignment(
             rig=self.guarded_rig,
             controller=self.controller,

@@ -60,7 +60,7 @@ class CharucoBoard:
 
 
 class Intrinsics(NamedTuple):
-    """What a calibration tells of a camera.
+    """Lens of a camera by its calibration.
 
     Attributes:
         focal: fx and fy [px].

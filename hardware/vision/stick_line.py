@@ -93,7 +93,7 @@ def search_rays(
 
 
 def _stick_response(lines: np.ndarray, width: float) -> np.ndarray:
-    """How much a bar of `width` about each pixel exceeds the strips on both sides, >= 0."""
+    """Excess of a bar of `width` about each pixel over the strips on both sides, >= 0."""
     inner = max(int(0.8 * width), 3) | 1
     flank = max(int(FLANK_SHARE * width), 2)
     total = np.cumsum(np.pad(lines, ((0, 0), (1, 0))), axis=1, dtype=np.float32)
@@ -112,7 +112,7 @@ def _stick_response(lines: np.ndarray, width: float) -> np.ndarray:
 
 
 class Edges(NamedTuple):
-    """What was found in each row; all of shape (rows,).
+    """The stick in each row; all of shape (rows,).
 
     Attributes:
         row: [px].

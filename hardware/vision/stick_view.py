@@ -1,4 +1,4 @@
-"""What is known about a view before its first frame: where the stick and the marker can be."""
+"""A view before its first frame: where the stick and the marker can be."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -127,14 +127,10 @@ def _lens(camera: Camera) -> CameraModel:
     where = f"cameras: {camera.view}: intrinsics"
     try:
         lens = read_camera(Path(str(camera.intrinsics)))
-    except OSError as err:
+    except (OSError, CameraModelError) as err:
         raise RigError(
-            f"{camera.intrinsics}: {err.strerror}",
-            where=where,
-            fix="run: bolfi-liquids rig calibrate-cameras",
+            str(err), where=where, fix="run: bolfi-liquids rig calibrate-cameras"
         ) from err
-    except CameraModelError as err:
-        raise RigError(str(err), where=where, fix="write the file again") from err
     if lens.size != (camera.width, camera.height):
         raise RigError(
             f"calibrated at {lens.size[0]}x{lens.size[1]}, recorded at "
@@ -146,7 +142,7 @@ def _lens(camera: Camera) -> CameraModel:
 
 
 def stick_view(rig: Rig, view: View, camera: CameraModel | None = None) -> StickView:
-    """What is known about one view before its first picture.
+    """View of a rig's camera before its first picture.
 
     Args:
         rig: Its sizes.

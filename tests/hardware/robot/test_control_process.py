@@ -88,6 +88,10 @@ def test_paths_are_played_one_after_the_other_and_the_last_pose_is_held():
     held = [*leg(1, 3).base, *leg(2, 2).base]
     assert [x for x, _ in told[:5]] == [pose[0] for pose in held]
     assert play(start, 3)[0] == start
+    # joined paths keep their time: what is commanded already is not commanded again
+    base = leg(1, 3).base
+    _, told = play(queued(Course(base[0]), leg(1, 3)), 2)
+    assert [x for x, _ in told] == [pose[0] for pose in base[1:]]
 
 
 def test_the_trail_measures_the_distance_from_the_nearest_recent_set_point():

@@ -94,6 +94,7 @@ BROKEN = {
     "box x": (slid(STIR, 0, 0.08), "x = .* is outside"),
     "box y": (slid(STIR, 1, 0.08), "y = .* is outside"),
     "box z": (slid(STIR, 2, 0.37), "z = .* is outside"),
+    "tip": (slid(STIR, 0, 0.0362), "cup's axis"),
     "speed": (straight(0.16), r"speed 0\.15[0-9]* m/s is above 0\.15"),
     "acceleration": (put(STIR, 700, 0, STIR.pose[700, 0] + 2e-4), "acceleration .* is above"),
     "jump": (put(STIR, 700, 0, STIR.pose[700, 0] + 0.01), r"path at 5\.6.* speed .* is above"),

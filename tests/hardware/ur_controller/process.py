@@ -127,15 +127,6 @@ class ControllerProcess:
         tcp = space.tcp.tolist()
         return cls(controller=rig.robot.controller, joints=joints.tolist(), tcp=tcp)
 
-    @property
-    def pid(self) -> int:
-        return self._process.pid
-
-    @property
-    def alive(self) -> bool:
-        """Whether it still runs."""
-        return self._process.poll() is None
-
     def notes(self) -> str:
         """What the emulator has written so far: why programs stopped, ticks left out."""
         if self._notes.closed:
