@@ -135,7 +135,7 @@ class Robot(RigSection, frozen=True):
         stirring_orientation: Rotation vector of the tool while it stirs, in the base frame [rad].
         pouring_orientation: The same before it pours, the source cup upright.
         start: Joint angles with the stick's pivot above the cup [rad]: which of the arm's
-            configurations works; with them `rig_checks` tells where the cup stands.
+            configurations works; with them `rig_file` tells where the cup stands.
     """
 
     host: str

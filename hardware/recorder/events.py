@@ -4,7 +4,7 @@ import errno
 import json
 import os
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -139,13 +139,15 @@ class Disk:
 
 
 @contextmanager
-def told_if_fails(disk: Disk) -> Iterator[None]:
-    """Leave the reason in the events when a process ends by an error."""
-    try:
-        yield
-    except Exception as err:
-        disk.tell("failed", reason=f"{type(err).__name__}: {err}")
-        raise
+def writing(directory: Path, source: str) -> Iterator[Disk]:
+    """The disk and the events of a process; an error that ends it leaves its reason there."""
+    with closing(EventLog(directory, source)) as log:
+        disk = Disk(log)
+        try:
+            yield disk
+        except Exception as err:
+            disk.tell("failed", reason=f"{type(err).__name__}: {err}")
+            raise
 
 
 class Outcome(NamedTuple):

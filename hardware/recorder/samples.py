@@ -1,7 +1,6 @@
 """samples.csv: what is recorded of the robot at each tick, and the process that writes it down."""
 
 from collections.abc import Iterator
-from contextlib import closing
 from functools import partial
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import NamedTuple
 from ..board import Board, Row, Who, host_time
 from ..csv_file import CsvAppender
 from ..process import leave_signals_to_main
-from .events import Disk, EventLog, told_if_fails
+from .events import Disk, writing
 
 SAMPLES = "samples.csv"
 HEARTBEAT = 0.04  # [s], at the longest, from one sign of life to the next
@@ -74,7 +73,7 @@ def run_recorder(board: Board, samples: Connection, main: Connection, directory:
         OSError: Not even an event can be written at the start.
     """
     leave_signals_to_main()
-    with closing(EventLog(directory, "recorder")) as log, told_if_fails(disk := Disk(log)):
+    with writing(directory, "recorder") as disk:
         table = disk.write(SAMPLES, lambda: CsvAppender(directory / SAMPLES, Sample._fields))
         begun, count = host_time(), 0
         for rows in _arriving(samples, main, disk):

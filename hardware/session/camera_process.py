@@ -16,7 +16,7 @@ from ..cameras.base import CameraError, FrameSource
 from ..csv_file import CsvAppender
 from ..process import come_first, leave_signals_to_main
 from ..recorder.directory import frames_file, video_file
-from ..recorder.events import Disk, EventLog, told_if_fails
+from ..recorder.events import Disk, writing
 from ..recorder.video import VideoWriter
 from ..rig import Rig, View
 from ..vision.frame import Flag, Frame, FrameMeasurement, line_is_good, stamp_fault
@@ -59,7 +59,7 @@ def run_camera(
     """
     leave_signals_to_main()
     come_first()
-    with closing(EventLog(directory, f"camera_{view}")) as log, told_if_fails(disk := Disk(log)):
+    with writing(directory, f"camera_{view}") as disk:
         process = _CameraProcess(rig, view, board, disk, directory)
         leaving, answered = Event(), Event()
         Thread(target=_wait_for_end, args=(main, leaving, answered, process), daemon=True).start()

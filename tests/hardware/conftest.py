@@ -13,8 +13,7 @@ from bolfi_liquids.hardware.motion.kinematics import inverse
 from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.recorder.events import EventLog, read_events
 from bolfi_liquids.hardware.rig import Rig
-from bolfi_liquids.hardware.robot import control_loop, ur
-from bolfi_liquids.hardware.robot import queues as order_queue
+from bolfi_liquids.hardware.robot import control_loop, queues, ur
 from bolfi_liquids.hardware.robot.control_loop import ControlLoop, Links, checked
 from bolfi_liquids.hardware.robot.orders import (
     Assignment,
@@ -182,7 +181,7 @@ def stepped_loop(monkeypatch):
     # the process of the tests keeps its priority
     monkeypatch.setattr(control_loop, "quieten", lambda: None)
     monkeypatch.setattr(control_loop, "hurry", lambda: "normal")
-    monkeypatch.setattr(order_queue, "hurry", lambda: "normal")
+    monkeypatch.setattr(queues, "hurry", lambda: "normal")
     running: list[SteppedControl] = []
 
     def make(to: Assignment, clock: SteppedClock, emulator: SteppedController | None = None):

@@ -74,7 +74,7 @@ def play(course, ticks):
     told = []
     for _ in range(ticks):
         course, turn = advanced(course)
-        told.append((course.hold[0], turn))
+        told.append((course.hold[2], turn))
     return course, told
 
 
@@ -86,12 +86,12 @@ def test_paths_are_played_one_after_the_other_and_the_last_pose_is_held():
     assert began == [(0, 1), (3, 2)] and done == [(3, 1), (5, 2)]
     assert course.hold == pytest.approx(leg(2, 2).base[-1]) and course.leg is None
     held = [*leg(1, 3).base, *leg(2, 2).base]
-    assert [x for x, _ in told[:5]] == [pose[0] for pose in held]
+    assert [z for z, _ in told[:5]] == [pose[2] for pose in held]
     assert play(start, 3)[0] == start
     # joined paths keep their time: what is commanded already is not commanded again
     base = leg(1, 3).base
     _, told = play(queued(Course(base[0]), leg(1, 3)), 2)
-    assert [x for x, _ in told] == [pose[0] for pose in base[1:]]
+    assert [z for z, _ in told] == [pose[2] for pose in base[1:]] and base[0, 2] != base[1, 2]
 
 
 def test_the_trail_measures_the_distance_from_the_nearest_recent_set_point():

@@ -6,12 +6,14 @@ import time
 
 import numpy as np
 import pytest
+from bolfi_liquids.hardware import emulated
 from bolfi_liquids.hardware.arm import LinkLost
 from bolfi_liquids.hardware.errors import MotionRejected, RigError
 from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.robot.ur import URArm, URReader
+from stepped_clock import SteppedClock
 from ur_controller.process import FOLDER, ControllerProcess
 
 pytest.importorskip("rtde_control")
@@ -78,6 +80,22 @@ def test_a_lost_link_is_seen_at_once_and_stays_lost(emulator):
     assert reader.read().time == state.time
     assert not reader.read().connected
     reader.close()
+
+
+def test_a_link_that_comes_back_by_itself_stays_lost(step_emulator, at_once):
+    joints = emulated(RIG, stir(RIG).pose[0]).controller.joints
+    emulator = step_emulator(SteppedClock(), joints=joints)
+    reader = URReader(emulator.address, 125.0)
+    arm = URArm(RIG, emulator.address, "stirring")
+    for one in (reader, arm):
+        one.connect()
+    arm.take_control()
+    emulator.drop()
+    assert not reader.read().connected and not arm.read().connected
+    emulator.reconnect()
+    assert not reader.read().connected and not arm.read().connected
+    with pytest.raises(LinkLost):
+        arm.command(np.array(arm.read().pose))
 
 
 @pytest.mark.parametrize("tool", ["stirring", "pouring"])
@@ -151,6 +169,7 @@ from bolfi_liquids.hardware.motion.poses import cup_frame
 from ur_controller.process import Admin
 from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.rig_file import bundled_rig
+from bolfi_liquids.hardware import emulated
 from bolfi_liquids.hardware.arm import LinkLost
 from bolfi_liquids.hardware.robot.ur import URArm
 

@@ -70,6 +70,11 @@ class SteppedController:
         for client in self.clients:
             client.disconnect()
 
+    def reconnect(self) -> None:
+        """Open them again, as the library does by itself."""
+        for client in self.clients:
+            client.connected = True
+
     def send(self, values: dict[str, float]) -> None:
         """A client's package; on a frozen link it waits."""
         if self.clock.now() < self._frozen_until:
@@ -95,21 +100,21 @@ class _Client:
     emulator: SteppedController
 
     def __init__(self):
-        self._open, self._last = True, self.emulator.published
+        self.connected, self._last = True, self.emulator.published
         self.emulator.clients.append(self)
 
     @property
     def latest(self) -> Snapshot:
         """It stays what it was once the link is lost."""
-        if self._open:
+        if self.connected:
             self._last = self.emulator.published
         return self._last
 
     def isConnected(self) -> bool:
-        return self._open
+        return self.connected
 
     def disconnect(self) -> None:
-        self._last, self._open = self.latest, False
+        self._last, self.connected = self.latest, False
 
 
 GETTERS: dict[str, Callable[[Snapshot], object]] = {
@@ -185,7 +190,7 @@ class _Control(_Client):
         self._later.append(self._ended())
 
     def _runs(self) -> bool:
-        return self._open and self.latest.runtime_state == 2
+        return self.connected and self.latest.runtime_state == 2
 
     def _wait(self, command: int, numbers: list[float]) -> bool:
         for _ in self._carried_out(command, numbers):
@@ -211,7 +216,7 @@ class _Control(_Client):
             self._later.pop(0)
 
     def _send(self, command: int, numbers: list[float]) -> None:
-        if self._open:
+        if self.connected:
             names = (f"input_double_register_{FIRST + i}" for i in range(len(numbers)))
             values = dict(zip(names, numbers, strict=True))
             self.emulator.send({f"input_int_register_{FIRST}": command} | values)

@@ -144,6 +144,15 @@ def test_long_gaps_and_times_outside_have_no_value_but_a_reason():
     assert Flag.GAP in Flag(int(found.flags[0])) and Flag.GAP in Flag(int(found.flags[4]))
 
 
+def test_a_second_neighbour_beyond_a_gap_does_not_count():
+    stamps, angles = [0.0, 0.2, 7 / 30, 8 / 30, 0.3], [1.0, 0.2, 7 / 30, 8 / 30, 0.3]
+    for sign in (1.0, -1.0):  # before the gap and after it
+        rows = sorted((sign * stamp, angle) for stamp, angle in zip(stamps, angles, strict=True))
+        series = as_series([frame(k, *row) for k, row in enumerate(rows)])
+        found = interpolate_lines(series, np.array([sign * 0.21]))
+        assert found.angle == pytest.approx([0.21])
+
+
 def test_no_frames_give_no_values():
     for count in (0, 1):
         frames = [frame(k, k / 30, 0.1) for k in range(count)]
