@@ -7,15 +7,12 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.board import SPAWN
 from bolfi_liquids.hardware.rendering import (
-    Look,
     WorldState,
     exposure_times,
     prepare,
     render,
 )
 from bolfi_liquids.hardware.rendering.world import ROWS, SharedWorld
-from rendered_faults import fault_of
-from rendered_refraction import refracted
 from rendered_scenes import CLEAN, rehearsal_camera, rehearsal_scene
 
 pytest.importorskip("cv2")
@@ -79,38 +76,12 @@ def test_a_lens_that_distorts_bends_the_stick():
     assert np.ptp(bent) > 0.5
 
 
-def test_the_submerged_part_looks_as_wide_and_as_far_aside_as_the_refractive_index():
-    # on the cup's axis plane a cylinder of liquid magnifies by its refractive index
-    pivot = (0.012, 0.0, 0.235)
-    look = dataclasses.replace(CLEAN, liquid=190.0, glass=190.0)
-    stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), look)
-    image = refracted(stage, state(0.0, pivot=pivot), RNG)
-    above, below = image[290].astype(float), image[390].astype(float)
-    shift = []
-    for line in (above, below):
-        weight = np.clip(185.0 - line, 0, None)
-        middle = weight @ np.arange(640) / weight.sum() - 319.5
-        shift.append((middle, (line < 150).sum()))
-    assert shift[1][0] / shift[0][0] == pytest.approx(1.33, rel=0.03)
-    assert shift[1][1] / shift[0][1] == pytest.approx(1.33, rel=0.12)
-
-
 def test_noise_has_the_strength_that_was_asked_for():
     look = dataclasses.replace(CLEAN, read_noise=2.0, shot_noise=0.05)
     clean, noisy = picture([state(0.0)]), picture([state(0.0)], look)
     difference = (noisy.astype(float) - clean)[:100, :150]
     assert difference.std() == pytest.approx(np.hypot(2.0, np.sqrt(0.05 * 190)), rel=0.05)
     assert abs(difference.mean()) < 0.1
-
-
-def test_faults_are_as_frequent_as_asked_and_repeat_with_the_seed():
-    stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), Look())
-    drawn = [fault_of(k, 0.1, stage, 3) for k in range(3000)]
-    share = np.mean([fault is not None for fault in drawn])
-    # 1000 independent draws of three frames each
-    assert share == pytest.approx(0.1, abs=4 * np.sqrt(0.09 / 1000))
-    assert {fault.kind for fault in drawn if fault} == {"hand", "hose", "glare"}
-    assert fault_of(77, 1.0, stage, 3) == fault_of(77, 1.0, stage, 3)
 
 
 def test_exposures_surround_their_middle_and_a_gripper_out_of_view_leaves_the_backdrop():

@@ -118,6 +118,14 @@ def test_a_path_that_breaks_a_limit_is_refused_as_a_whole(name):
     assert np.array_equal(path.pose, before, equal_nan=True)
 
 
+def test_a_path_may_come_up_to_a_limit_and_not_beyond():
+    straight_up = insert(RIG)  # planned at 0.05 m/s and 0.5 m/s2
+    check_path(straight_up, with_limits(speed=0.05, acceleration=0.5), "stirring")
+    for name, value in (("speed", 0.0495), ("acceleration", 0.495)):
+        with pytest.raises(MotionRejected, match=name):
+            check_path(straight_up, with_limits(**{name: value}), "stirring")
+
+
 def test_the_box_s_margin_is_the_way_to_stop():
     assert margin(0.1, RIG.limits) == pytest.approx(0.1**2 / (2 * 0.6) + 0.1 * 0.05)
     # a stroke at full speed ends 13 mm before the side; a slow one may come to it

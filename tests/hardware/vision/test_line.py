@@ -20,8 +20,8 @@ from bolfi_liquids.hardware.vision import (
     line_is_good,
     measure,
 )
+from bolfi_liquids.hardware.vision.stick_view import circle
 from rendered_faults import fault_of, render_with
-from rendered_refraction import refracted
 from rendered_scenes import CLEAN, rehearsal_camera, rehearsal_scene, stick_view
 
 cv2 = pytest.importorskip("cv2")
@@ -44,12 +44,6 @@ class Bench:
     def picture(self, inclination_deg, pivot=(0.0, 0.0, 0.235), fault=None) -> np.ndarray:
         state = WorldState(0.0, np.array(pivot), np.radians(inclination_deg))
         return render_with(fault, self.stage, [state] * 3, self.rng)
-
-    def refracted(self, inclination_deg, pivot=(0.0, 0.0, 0.235)) -> np.ndarray:
-        """With the stick in the liquid, as it is seen through the cup's wall."""
-        return refracted(
-            self.stage, WorldState(0.0, np.array(pivot), np.radians(inclination_deg)), self.rng
-        )
 
     def truth(self, inclination_deg, pivot=(0.0, 0.0, 0.235)) -> float:
         """Angle [rad] of the stick's axis in the picture: of two of its points, by pinhole."""
@@ -114,21 +108,15 @@ def test_standard_errors_are_as_large_as_the_errors():
     assert 0.7 < np.sqrt(np.mean(np.square(normalised))) < 1.4
 
 
-def test_refraction_below_the_surface_does_not_reach_the_line():
-    bench = Bench(CLEAN)
-    for pose in (((7.0, 0.0), (0.0, 0.0, 0.235)), ((0.0, 0.0), (0.012, 0, 0.235))):
-        image, truth = bench.refracted(*pose), bench.truth(*pose)
-        assert abs(np.degrees(plain_fit(image, 130, 410) - truth)) > 0.5
-        assert abs(np.degrees(bench.measure(image).angle - truth)) < 0.005
-
-
-def plain_fit(image: np.ndarray, first: int, last: int) -> float:
-    """Angle [rad] of a line through the mean dark column of each row."""
-    weight = np.clip(130.0 - image[first:last].astype(float), 0, None)
-    weight[weight < 10] = 0.0
-    seen = weight.sum(axis=1) > 0
-    middle = (weight @ np.arange(image.shape[1]))[seen] / weight.sum(axis=1)[seen]
-    return float(np.arctan(np.polyfit(np.arange(first, last)[seen], middle, 1)[0]))
+def test_nothing_below_the_liquid_s_surface_reaches_the_line():
+    """The liquid bends what is seen through it."""
+    bench, pose = Bench(FAULTLESS), ((7.0, 3.0), (0.012, -0.01, 0.235))
+    rim = circle(bench.scene.cup_radius, bench.view.surface_height)
+    assert bench.view.last_row <= bench.camera.project(rim)[:, 1].min()
+    image = bench.picture(*pose)
+    found, last = bench.measure(image), int(np.ceil(bench.view.last_row))
+    image[last:] = np.random.default_rng(0).integers(0, 255, image[last:].shape)
+    assert bench.measure(image) == found
 
 
 def flags_of(bench: Bench, image, track=None) -> Flag:
