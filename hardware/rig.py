@@ -7,7 +7,7 @@ them. What numbers must be true together is in `rig_file`.
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -20,7 +20,6 @@ from pydantic import (
 from pydantic_core import CoreSchema, core_schema
 
 CHECK_ENDS = "check ends"
-COMPARE = "compare with the bundled rig.toml (SI units unless the name says otherwise)"
 MAX_CYCLES = 100  # stars in a recording
 MIN_CUP_RADIUS = 0.01  # [m]
 MIN_LOOK = 0.05  # [m], from a camera to what it looks at
@@ -43,20 +42,6 @@ class RigSection(BaseModel, frozen=True, allow_inf_nan=False):
             for fault in (what for what, found in self.faults().items() if found):
                 raise ValueError(fault)
         return self
-
-
-class RigFault(NamedTuple):
-    """A fault of a rig.
-
-    Attributes:
-        field: Such as `robot.host`; empty if several fields are involved.
-        what: Description, with the values.
-        fix: Cure.
-    """
-
-    field: str
-    what: str
-    fix: str = COMPARE
 
 
 @dataclass(frozen=True)

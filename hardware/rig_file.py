@@ -19,15 +19,31 @@ from .errors import RigError
 from .motion.kinematics import forward, inverse
 from .motion.poses import cup_frame, rotation_matrix
 from .motion.stir_paths import above_cup
-from .rig import CHECK_ENDS, COMPARE, MIN_CUP_RADIUS, Camera, Rig, RigFault, RigSection
+from .rig import CHECK_ENDS, MIN_CUP_RADIUS, Camera, Rig, RigSection
 from .safety.limits import MAX_TILT, Workspace, workspace
 
 BUNDLED = "rig.toml"
+COMPARE = "compare with the bundled rig.toml (SI units unless the name says otherwise)"
 LEVEL_TILT = np.radians(20.0)  # of a gripper that holds a source cup, from level
 LIP_AWAY = 0.005  # m, of a source's lip from the gripper's axis, above it and towards the receiver
 MAX_MARKER_AWAY = 0.15  # m, of a marker on the gripper from the stick's pivot
 MAX_VIEW = np.radians(60.0)  # of a pivot from the middle of a picture; where the lens is measured
 MAX_START_AWAY = 0.04  # m, of the pivot at `start` from its place above the cup; a cup is as wide
+
+
+class RigFault(NamedTuple):
+    """A fault of a rig.
+
+    Attributes:
+        field: Such as `robot.host`; empty if several fields are involved.
+        what: Description, with the values.
+        fix: Cure.
+    """
+
+    field: str
+    what: str
+    fix: str = COMPARE
+
 
 # whether a number is wrong, and the `RigFault` that this is
 Rules = Iterable[tuple[bool, str, str] | tuple[bool, str, str, str]]
