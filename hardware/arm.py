@@ -1,4 +1,4 @@
-"""What a robot must be able to do, by capability; each driver is a file of its own."""
+"""Protocols of robots, by capability; each driver is a file of its own."""
 
 import math
 from typing import Literal, NamedTuple, Protocol
@@ -14,7 +14,7 @@ LOOKAHEAD = 0.1  # s, by about which an arm lags its set-points
 
 
 class ArmState(NamedTuple):
-    """The arm as its controller tells it.
+    """State of the arm by its controller.
 
     Attributes:
         time: The controller's clock [s].
@@ -44,12 +44,12 @@ class ArmState(NamedTuple):
 
     @property
     def speed(self) -> float:
-        """Of the tool's centre [m/s]."""
+        """Speed of the tool's centre [m/s]."""
         return math.hypot(*self.velocity[:3])
 
 
 class Payload(NamedTuple):
-    """What the controller says hangs on the flange.
+    """Payload on the flange by the controller.
 
     Attributes:
         mass: [kg].
@@ -61,7 +61,7 @@ class Payload(NamedTuple):
 
 
 class ArmReader(Protocol):
-    """Tells where the arm is, and can do nothing else."""
+    """Reads where the arm is, and can do nothing else."""
 
     def connect(self) -> None:
         """Open the connection.
@@ -80,7 +80,7 @@ class ArmReader(Protocol):
         ...
 
     def payload(self) -> Payload:
-        """What the controller says hangs on the flange."""
+        """Payload on the flange by the controller."""
         ...
 
     def close(self) -> None:
@@ -109,7 +109,7 @@ class PathFollower(ArmReader, Protocol):
         ...
 
     def arm_watchdog(self) -> None:
-        """From now on the controller stops the arm unless set-points keep coming."""
+        """Make the controller stop the arm when set-points cease."""
         ...
 
     def command(self, pose: np.ndarray) -> None:

@@ -9,7 +9,7 @@ from enum import IntEnum
 from multiprocessing import current_process, get_context
 from typing import Any, NamedTuple
 
-from .host_clock import REAL_CLOCK
+from .process import REAL_CLOCK
 
 SPAWN = get_context("spawn")  # a fork would copy threads and open sockets of JAX and RTDE
 
@@ -42,7 +42,7 @@ class Who(IntEnum):
 
 
 class Trouble(IntEnum):
-    """What a participant complains of."""
+    """Trouble of a participant."""
 
     NONE = 0
     WRITE_FAILED = 1
@@ -53,7 +53,7 @@ class Trouble(IntEnum):
 
     @property
     def kind(self) -> str:
-        """Of the event that tells of it."""
+        """Kind of the event that tells of it."""
         return self.name.lower()
 
 
@@ -64,7 +64,7 @@ class Row(NamedTuple):
         beat: Host time of the last one [s]; 0 before the first.
         trouble: A `Trouble`.
         count: Pictures read, rows written or ticks made.
-        rate: Of them, per second, over the last second or so.
+        rate: Of them, per second, since the first.
         value: Control: progress through the plan in [0, 1]; a camera: the angle it sees [rad].
         worst: Control: greatest lateness of a tick [s]; a camera: greatest age of a picture [s].
     """

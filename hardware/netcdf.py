@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 def netcdf_content(data: "Dataset | DataTree") -> bytes:
-    """What a netCDF file of `data` contains, such that xarray reads it back with h5netcdf.
+    """Bytes of a netCDF file of `data`, such that xarray reads it back with h5netcdf.
 
     In memory, since HDF5 crashes at the process's end after a write that the disk refused.
     """

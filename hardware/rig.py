@@ -1,32 +1,109 @@
 """rig.toml: the robot, the cameras and what stands in front of them, as a person writes it down.
 
-Each number has its ends here; what numbers must be true together is in `rig_checks`.
+Each number has a lower and an upper end, its unit, and why. The ends keep an arm from doing harm.
+They are checked where a rig.toml is opened and before a session starts, by `CHECK_ENDS` as the
+context of the validation; the rig of a recording, by which nothing moves any more, is read without
+them. What numbers must be true together is in `rig_file`.
 """
 
-from typing import Annotated, Literal
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import model_validator
-
-from .rig_numbers import (
-    Acceleration,
-    Angle,
-    Balance,
-    Coordinate,
-    Degrees,
-    Length,
-    Mass,
-    Point,
-    RigSection,
-    Speed,
-    Tcp,
-    Turn,
-    Within,
+from pydantic import (
+    BaseModel,
+    GetCoreSchemaHandler,
+    ValidationInfo,
+    field_validator,
+    model_validator,
 )
+from pydantic_core import CoreSchema, core_schema
 
+CHECK_ENDS = "check ends"
 MAX_CYCLES = 100  # stars in a recording
 MIN_CUP_RADIUS = 0.01  # [m]
+MIN_LOOK = 0.05  # [m], from a camera to what it looks at
+MIN_STICK_DENSITY = 300.0  # [kg/m3]; balsa and cork are lighter, and swim
+MAX_STICK_DENSITY = 25_000.0  # [kg/m3]; no stick is denser
+CONTROLLER_RATE = {"cb3": 125.0, "e-series": 500.0}  # Hz; others are rounded by the controller
 View = Literal["xz", "yz"]
+
+
+class RigSection(BaseModel, frozen=True, allow_inf_nan=False):
+    """Part of a rig.toml; no change after reading."""
+
+    def faults(self) -> dict[str, bool]:
+        """Contradictions between the section's own numbers: a message, and whether it is true."""
+        return {}
+
+    @model_validator(mode="after")
+    def _agrees(self, info: ValidationInfo) -> Self:
+        if info.context == CHECK_ENDS:
+            for fault in (what for what, found in self.faults().items() if found):
+                raise ValueError(fault)
+        return self
+
+
+@dataclass(frozen=True)
+class Within:
+    """Ends of a number, both allowed, its unit and the reason; annotates the number's field."""
+
+    low: float
+    high: float
+    unit: str
+    why: str
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.with_info_after_validator_function(self._checked, handler(source))
+
+    def _checked(self, value: Any, info: ValidationInfo) -> Any:
+        """The value; a text or None, where the field allows that, has no ends."""
+        is_number = isinstance(value, int | float)
+        if info.context == CHECK_ENDS and is_number and not self.low <= value <= self.high:
+            unit = f" {self.unit}".rstrip()
+            ends = f"{self.low:g} to {self.high:g}{unit}"
+            raise ValueError(f"{value:g}{unit} is not within {ends}: {self.why}")
+        return value
+
+
+Coordinate = Annotated[float, Within(-3.0, 3.0, "m", "more looks like millimetres")]
+Length = Annotated[float, Within(1e-4, 3.0, "m", "more looks like millimetres")]
+Mass = Annotated[float, Within(1e-4, 30.0, "kg", "more looks like grams")]
+Angle = Annotated[
+    float,
+    Within(-2 * np.pi, 2 * np.pi, "rad", "a joint turns once at the most; convert degrees to rad"),
+]
+Degrees = Annotated[float, Within(-360.0, 360.0, "deg", "more than a turn says nothing new")]
+Speed = Annotated[
+    float,
+    Within(
+        0.005, 0.25, "m/s", "a slower arm never arrives, a faster one is not safe beside a person"
+    ),
+]
+Acceleration = Annotated[
+    float,
+    Within(
+        0.02, 0.6, "m/s2", "a softer arm needs more way to stop than a box has, a harder one jerks"
+    ),
+]
+Aside = Annotated[float, Within(-0.2, 0.2, "m", "a tool is held near the axis of the flange")]
+Ahead = Annotated[
+    float,
+    Within(0.03, 0.6, "m", "a tool begins in front of the flange and ends within the arm's reach"),
+]
+MountedAhead = Annotated[float, Within(0.0, 0.4, "m", "what is mounted is in front of the flange")]
+_LET_GO = "an arm works beside people, and may be let go so far at the most"
+AcrossCup = Annotated[float, Within(-0.2, 0.2, "m", _LET_GO)]
+AboveCup = Annotated[float, Within(0.05, 1.0, "m", _LET_GO)]
+AroundCup = Annotated[float, Within(-1.0, 1.0, "m", _LET_GO)]
+AboveTable = Annotated[float, Within(0.0, 1.0, "m", _LET_GO)]
+
+Point = tuple[Coordinate, Coordinate, Coordinate]
+Turn = tuple[Angle, Angle, Angle]
+Tcp = tuple[Aside, Aside, Ahead, Angle, Angle, Angle]
+Balance = tuple[Aside, Aside, MountedAhead]
 
 
 class Robot(RigSection, frozen=True):
@@ -43,7 +120,7 @@ class Robot(RigSection, frozen=True):
         stirring_orientation: Rotation vector of the tool while it stirs, in the base frame [rad].
         pouring_orientation: The same before it pours, the source cup upright.
         start: Joint angles with the stick's pivot above the cup [rad]: which of the arm's
-            configurations works; with them `rig_checks` tells where the cup stands.
+            configurations works; with them `rig_file` tells where the cup stands.
     """
 
     host: str
@@ -59,6 +136,11 @@ class Robot(RigSection, frozen=True):
     pouring_orientation: Turn
     start: tuple[Angle, Angle, Angle, Angle, Angle, Angle]
 
+    def faults(self) -> dict[str, bool]:
+        base = CONTROLLER_RATE[self.controller]
+        what = f"rate {self.rate:g} Hz does not divide the controller's {base:g} Hz; use 125"
+        return {what: bool(base % self.rate)}
+
 
 class CupSettings(RigSection, frozen=True):
     """The cup that is stirred: where it stands in the base frame, and its sizes [m]."""
@@ -70,6 +152,10 @@ class CupSettings(RigSection, frozen=True):
     ]
     height: Annotated[float, Within(0.01, 0.4, "m", "a cup is as high as a hand can hold")]
     fill: Length
+
+    def faults(self) -> dict[str, bool]:
+        what = f"fill {self.fill} m is not below height {self.height} m"
+        return {what: self.fill >= self.height}
 
 
 class StickSettings(RigSection, frozen=True):
@@ -85,9 +171,20 @@ class StickSettings(RigSection, frozen=True):
         """Mean over its volume [kg/m3]."""
         return self.mass / (np.pi * self.radius**2 * self.length)
 
+    def faults(self) -> dict[str, bool]:
+        mass = f"mass {self.mass:g} kg"
+        light = (
+            f"{mass} is a density of {self.density:.3g} kg/m3, which no stick has (at least "
+            f"{MIN_STICK_DENSITY:g}); weigh it in kg"
+        )
+        return {
+            f"{mass} looks like grams; convert it to kg": self.density > MAX_STICK_DENSITY,
+            light: self.density < MIN_STICK_DENSITY,
+        }
+
 
 class LiquidSettings(RigSection, frozen=True):
-    """What is known of the liquid before it is stirred: its weighed density [kg/m3]."""
+    """The liquid before it is stirred: its weighed density [kg/m3]."""
 
     density: Annotated[float, Within(50.0, 20_000.0, "kg/m3", "no liquid is as light or as heavy")]
 
@@ -108,7 +205,9 @@ class StirringSettings(RigSection, frozen=True):
     """
 
     pattern: Literal["star", "circle"] = "star"
-    points: Annotated[int, Within(5, 99, "vertices", "fewer make no star")] = 9
+    points: Annotated[
+        int, Within(5, 99, "vertices", "fewer make no star, nor does an even number")
+    ] = 9
     radius: Annotated[
         float, Within(0.005, 0.15, "m", "a smaller star moves no liquid, a larger one fits no cup")
     ] = 0.025
@@ -122,6 +221,13 @@ class StirringSettings(RigSection, frozen=True):
     ] = 2.0
     cycles: Annotated[int, Within(1, MAX_CYCLES, "times", "so often a pattern is stirred")] = 1
 
+    @field_validator("points")
+    @classmethod
+    def _is_odd(cls, points: int, info: ValidationInfo) -> int:
+        if info.context == CHECK_ENDS and points % 2 == 0:
+            raise ValueError(f"{points} is even: all strokes would lie on one line")
+        return points
+
 
 class Camera(RigSection, frozen=True):
     """A webcam: where it stands and looks, in the cup's frame.
@@ -129,6 +235,8 @@ class Camera(RigSection, frozen=True):
     Attributes:
         view: The plane it sees.
         source: Number of the device, or path of a video or of a directory of frames.
+        driver: File and class of another camera's driver, such as "my_camera.py:MyCamera", beside
+            rig.toml; the class is called with this section, and is a `cameras.FrameSource`.
         width: Of the picture [px].
         height: Of the picture [px].
         rate: Pictures per second.
@@ -143,6 +251,7 @@ class Camera(RigSection, frozen=True):
 
     view: View
     source: Annotated[int | str, Within(0, 9999, "", "devices are counted from 0")] = 0
+    driver: str | None = None
     width: Annotated[int, Within(160, 4096, "px", "no webcam's picture is as wide")] = 640
     height: Annotated[int, Within(120, 4096, "px", "no webcam's picture is as high")] = 480
     rate: Annotated[float, Within(5.0, 240.0, "Hz", "no webcam is as slow or as fast")] = 30.0
@@ -163,11 +272,19 @@ class Camera(RigSection, frozen=True):
     @property
     def is_device(self) -> bool:
         """Whether it is a camera, and not a file of pictures."""
-        return isinstance(self.source, int) or self.source.startswith("/dev/")
+        return isinstance(self.source, int) or self.source.startswith("/dev/") or bool(self.driver)
+
+    def faults(self) -> dict[str, bool]:
+        no_lens = self.intrinsics is None and self.focal_length is None
+        look = float(np.linalg.norm(np.subtract(self.target, self.position)))
+        return {
+            "neither intrinsics nor focal_length is given": no_lens,
+            f"position and target are less than {MIN_LOOK:g} m apart": look < MIN_LOOK,
+        }
 
 
 class PouringSettings(RigSection, frozen=True):
-    """Where a pour happens, in the base frame.
+    """Place of a pour, in the base frame.
 
     Attributes:
         receiver: Centre of the receiver's floor [m].
@@ -201,9 +318,32 @@ class AxisLimits(RigSection, frozen=True):
         """Upper corner, shape (3,)."""
         return np.array([self.x[1], self.y[1], self.z[1]])
 
+    def faults(self) -> dict[str, bool]:
+        axes = {"x": self.x, "y": self.y, "z": self.z}
+        return {
+            f"{axis} must ascend, got [{low}, {high}]": not low < high
+            for axis, (low, high) in axes.items()
+        }
+
+
+class StirringBox(AxisLimits, frozen=True):
+    """Within what is above a cup of a hand's size, with a stick of a forearm's length."""
+
+    x: tuple[AcrossCup, AcrossCup]
+    y: tuple[AcrossCup, AcrossCup]
+    z: tuple[AboveCup, AboveCup]
+
+
+class PouringBox(AxisLimits, frozen=True):
+    """Within an arm's length about the cup, never below the table."""
+
+    x: tuple[AroundCup, AroundCup]
+    y: tuple[AroundCup, AroundCup]
+    z: tuple[AboveTable, AboveTable]
+
 
 class Limits(RigSection, frozen=True):
-    """What a commanded motion and a running one must keep; a person may set them lower.
+    """Limits of a commanded motion and of a running one; a person may set them lower.
 
     Attributes:
         stirring: Where the pivot may go.
@@ -220,8 +360,8 @@ class Limits(RigSection, frozen=True):
         reduced_mode: Whether the controller's reduced safety mode is good enough.
     """
 
-    stirring: AxisLimits
-    pouring: AxisLimits
+    stirring: StirringBox
+    pouring: PouringBox
     speed: Speed = 0.15
     acceleration: Acceleration = 0.5
     tilt_rate_deg_s: Annotated[

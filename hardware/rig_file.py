@@ -1,26 +1,58 @@
-"""Reading a rig.toml, and the one that comes with the package."""
+"""Reading a rig.toml, and refusing numbers that contradict each other.
+
+A stick hangs from a gripper that points down, a source cup is upright before it pours, and `start`
+are the joints that a person read off with the stick's pivot above the cup: they say independently
+where the cup stands.
+"""
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
+import numpy as np
 from pydantic import ValidationError
 
 from .errors import RigError
-from .rig import Rig
-from .rig_checks import contradictions
-from .rig_numbers import CHECK_ENDS, COMPARE, RigFault, RigSection
+from .motion.kinematics import forward, inverse
+from .motion.poses import cup_frame, rotation_matrix
+from .motion.stir_paths import above_cup
+from .rig import CHECK_ENDS, MIN_CUP_RADIUS, Camera, Rig, RigSection
+from .safety.limits import MAX_TILT, Workspace, workspace
 
 BUNDLED = "rig.toml"
+COMPARE = "compare with the bundled rig.toml (SI units unless the name says otherwise)"
+LEVEL_TILT = np.radians(20.0)  # of a gripper that holds a source cup, from level
+LIP_AWAY = 0.005  # m, of a source's lip from the gripper's axis, above it and towards the receiver
+MAX_MARKER_AWAY = 0.15  # m, of a marker on the gripper from the stick's pivot
+MAX_VIEW = np.radians(60.0)  # of a pivot from the middle of a picture; where the lens is measured
+MAX_START_AWAY = 0.04  # m, of the pivot at `start` from its place above the cup; a cup is as wide
+
+
+class RigFault(NamedTuple):
+    """A fault of a rig.
+
+    Attributes:
+        field: Such as `robot.host`; empty if several fields are involved.
+        what: Description, with the values.
+        fix: Cure.
+    """
+
+    field: str
+    what: str
+    fix: str = COMPARE
+
+
+# whether a number is wrong, and the `RigFault` that this is
+Rules = Iterable[tuple[bool, str, str] | tuple[bool, str, str, str]]
 
 
 def open_rig(path: str | Path) -> Rig:
     """Read a rig that a person wrote down.
 
-    Paths in it (`intrinsics`, `source`) count from the file's own directory.
+    Paths in it (`intrinsics`, `source`, `driver`) count from the file's own directory.
 
     Raises:
         RigError: The file is missing or cannot be used; the message names the fields.
@@ -97,13 +129,233 @@ def _section(way: list[int | str]) -> type[RigSection]:
 
 
 def _beside(rig: Rig, directory: Path) -> Rig:
-    def placed(name: str | int | None) -> str | int | None:
-        return str(directory / name) if isinstance(name, str) else name
+    def placed(camera: Camera, *names: str) -> Camera:
+        given = {name: getattr(camera, name) for name in names}
+        found = {k: str(directory / name) for k, name in given.items() if isinstance(name, str)}
+        return camera.model_copy(update=found)
 
-    cameras = tuple(
-        camera.model_copy(
-            update={"intrinsics": placed(camera.intrinsics), "source": placed(camera.source)}
-        )
-        for camera in rig.cameras
+    # what `source` means is its driver's business
+    names = [("intrinsics", "driver" if camera.driver else "source") for camera in rig.cameras]
+    cameras = (placed(camera, *of) for camera, of in zip(rig.cameras, names, strict=True))
+    return rig.model_copy(update={"cameras": tuple(cameras)})
+
+
+# -- numbers that contradict each other, each of which is within its ends
+
+
+class Clearance(NamedTuple):
+    """Distances [m] by which the cup may be misplaced before the stick meets it.
+
+    Attributes:
+        aside: From the stick at a vertex of the star to the cup's wall.
+        along: From the stick's tip to the cup's floor while it stirs, or to the cup's rim while it
+            is carried above it: the smaller of both.
+    """
+
+    aside: float
+    along: float
+
+
+def clearance(rig: Rig) -> Clearance:
+    """Clearance of a rig's stick on all ways that are planned with it; both are positive."""
+    cup, stick, plan = rig.cup, rig.stick, rig.stirring
+    floor = plan.height - stick.length
+    rim = plan.clear_height - stick.length - cup.height
+    return Clearance(cup.radius - plan.radius - stick.radius, min(floor, rim))
+
+
+def contradictions(rig: Rig) -> Iterator[RigFault]:
+    """Contradictions in the order of checking; a later one may follow from an earlier one.
+
+    Args:
+        rig: Whose numbers are each within their ends.
+    """
+    for rules in (_speeds, _stick, _heights, _receiver, _cameras, _tools, _start):
+        yield from (RigFault(*fault) for found, *fault in rules(rig) if found)
+
+
+def receiver_fault(rig: Rig, radius: float) -> str:
+    """Message if a receiver overlaps the stirred cup, else an empty string.
+
+    Args:
+        rig: Says where both stand.
+        radius: Of the receiver [m], which is not the rig's but that of the cups that are poured
+            with.
+    """
+    apart = float(np.hypot(*np.subtract(rig.pouring.receiver[:2], rig.cup.position[:2])))
+    if apart > rig.cup.radius + radius:
+        return ""
+    return (
+        f"pouring.receiver is {apart:.3f} m from cup.position: it stands in the stirred cup "
+        f"(cup.radius = {rig.cup.radius} m, the receiver's is at least {radius:g} m)"
     )
-    return rig.model_copy(update={"cameras": cameras})
+
+
+def _receiver(rig: Rig) -> Rules:
+    fault = receiver_fault(rig, MIN_CUP_RADIUS)
+    yield bool(fault), "", fault
+
+
+def _speeds(rig: Rig) -> Rules:
+    for field, limit, unit in (
+        ("stirring.speed", "speed", "m/s"),
+        ("stirring.approach_speed", "speed", "m/s"),
+        ("pouring.approach_speed", "speed", "m/s"),
+        ("stirring.acceleration", "acceleration", "m/s2"),
+    ):
+        section, _, name = field.partition(".")
+        value, most = getattr(getattr(rig, section), name), getattr(rig.limits, limit)
+        yield value > most, field, f"{value} {unit} is above limits.{limit} {most} {unit}"
+
+
+def _stick(rig: Rig) -> Rules:
+    cup, stick, stirring = rig.cup, rig.stick, rig.stirring
+    tip, payload = stirring.height - stick.length, rig.robot.payload
+    where = f"the stick's tip is {tip:.3f} m above the floor, outside the liquid"
+    yield (
+        not 0.0 < tip < cup.fill,
+        "stirring.height",
+        f"{where} (cup.fill = {cup.fill} m)",
+    )
+    wall = f"{stirring.radius} m brings the stick to the cup's wall (cup.radius = {cup.radius} m)"
+    yield stirring.radius + stick.radius >= cup.radius, "stirring.radius", wall
+    part = f"{stick.mass} kg is not below robot.payload {payload} kg, of which the stick is a part"
+    yield stick.mass >= payload, "stick.mass", part
+    wet = cup.fill - tip
+    lifted = rig.liquid.density * np.pi * stick.radius**2 * wet * (stick.length - wet / 2)
+    floats = f"{stick.mass} kg floats up in a liquid of {rig.liquid.density:g} kg/m3; it must hang"
+    # moments about the pivot
+    yield lifted >= stick.mass * stick.length / 2, "stick.mass", floats
+    aside, error = clearance(rig).aside, rig.limits.tracking_error
+    # an arm lags along its way, which is level while it stirs
+    yield (
+        error >= aside,
+        "limits.tracking_error",
+        f"{1e3 * error:.1f} mm, and the stick comes within {1e3 * aside:.1f} mm of the cup's "
+        "wall (cup.radius, stick.radius, stirring.radius)",
+        "give less, 1 mm at least, or a smaller stirring.radius",
+    )
+
+
+def _heights(rig: Rig) -> Rules:
+    stick, stirring, (low, high) = rig.stick, rig.stirring, rig.limits.stirring.z
+    floor = f"{low} m lets the stick's tip reach the cup's floor (stick.length = {stick.length} m)"
+    yield low <= stick.length, "limits.stirring.z", floor
+    clear = stirring.clear_height
+    inside = clear - stick.length <= rig.cup.height
+    yield inside, "stirring.clear_height", f"{clear} m leaves the stick in the cup"
+    for name in ("height", "clear_height"):
+        height = getattr(stirring, name)
+        outside = f"{height} m is outside of limits.stirring.z {[low, high]} m"
+        yield not low <= height <= high, f"stirring.{name}", outside
+
+
+def _cameras(rig: Rig) -> Rules:
+    first, second = rig.cameras
+    both = f"both have the source {first.source!r}; each needs its own"
+    yield first.source == second.source and first.is_device, "cameras", both
+    between, age = 1.0 / min(first.rate, second.rate), rig.limits.frame_age
+    often = f"{age} s is below the {between:.3g} s from one picture of a camera to the next"
+    yield age < between, "limits.frame_age", often
+    for number, camera in enumerate(rig.cameras):
+        yield from _camera(rig, camera, f"cameras.{number}")
+
+
+def _camera(rig: Rig, camera: Camera, name: str) -> Rules:
+    position, pivot = np.array(camera.position), np.array([0.0, 0.0, rig.stirring.height])
+    yield (
+        bool(np.hypot(*position[:2]) <= rig.cup.radius),
+        f"{name}.position",
+        f"{list(camera.position)} m is on the cup's axis, or nearer to it than its wall",
+        "measure it again, in the cup's frame: from the centre of its floor, z upwards",
+    )
+    away = float(np.linalg.norm(camera.marker))
+    yield (
+        away > MAX_MARKER_AWAY,
+        f"{name}.marker",
+        f"{list(camera.marker)} m is {away:.2f} m from the stick's pivot",
+        f"measure it again, from the pivot: {MAX_MARKER_AWAY} m at the most",
+    )
+    ahead, there = np.subtract(camera.target, position), pivot - position
+    angle = _angle(ahead / np.linalg.norm(ahead), there / np.linalg.norm(there))
+    view = MAX_VIEW
+    if camera.intrinsics is None and camera.focal_length is not None:
+        view = float(np.arctan(np.hypot(camera.width, camera.height) / 2.0 / camera.focal_length))
+    yield (
+        angle > view,
+        f"{name}.target",
+        f"the stick's pivot is {np.degrees(angle):.0f} deg from the middle of the picture, and "
+        f"may be {np.degrees(view):.0f} deg",
+        "correct it, position or stirring.height: the camera must see the stick",
+    )
+
+
+def _tools(rig: Rig) -> Rules:
+    """A stick hangs from a tool that points down; a source cup is upright, and held from a side."""
+    for name, turn in _turns(workspace(rig, "stirring")).items():
+        tilt = _angle(turn[:, 2], (0.0, 0.0, -1.0))
+        yield (
+            tilt > MAX_TILT["stirring"],
+            "robot.stirring_orientation",
+            f"with it the {name} points {np.degrees(tilt):.0f} deg away from straight down",
+            "correct it or the turn in robot.stirring_tcp: the stick hangs from it",
+        )
+    space = workspace(rig, "pouring")
+    flange = _turns(space)["flange"]
+    tilt = abs(np.arcsin(np.clip(flange[2, 2], -1.0, 1.0)))
+    yield (
+        tilt > LEVEL_TILT,
+        "robot.pouring_orientation",
+        f"with it the flange points {np.degrees(tilt):.0f} deg away from level",
+        "correct it or the turn in robot.pouring_tcp: the cup is held from a side",
+    )
+    heading = np.radians(rig.pouring.heading_deg)
+    lip = flange[:, :2] @ space.tcp[:2]  # from the axis, wherever along it the cup is held
+    ahead = float(lip @ (np.cos(heading), np.sin(heading), 0.0))
+    for value, side in ((float(lip[2]), "above"), (ahead, "on the receiver's side of")):
+        yield (
+            value < LIP_AWAY,
+            "robot.pouring_tcp",
+            f"with it the source's lip is {1e3 * value:.0f} mm {side} the gripper's axis, not "
+            f"{1e3 * LIP_AWAY:.0f} mm or more",
+            "correct it, robot.pouring_orientation or pouring.heading_deg: the cup must be "
+            "upright, and turn towards the receiver",
+        )
+
+
+def _start(rig: Rig) -> Rules:
+    space, goal = workspace(rig, "stirring"), cup_frame(rig.cup).to_base(above_cup(rig))
+    yield (
+        inverse(space.arm, goal, space.start, tcp=space.tcp) is None,
+        "cup.position",
+        f"{list(rig.cup.position)} m: the arm does not reach the place above the cup",
+        "correct it, or place the cup nearer to the robot",
+    )
+    at = forward(space.arm, space.start, tcp=space.tcp)
+    x, y, z = (at - goal)[:3]
+    aside, along = float(np.hypot(x, y)), float(abs(z))
+    tilt = _angle(rotation_matrix(at[3:])[:, 2], rotation_matrix(goal[3:])[:, 2])
+    # two places of the cup that differ by more than the stick's clearance cannot both be safe
+    wall, floor = np.minimum(clearance(rig), MAX_START_AWAY)
+    yield (
+        bool(aside > wall or along > floor or tilt > MAX_TILT["stirring"]),
+        "robot.start",
+        f"these joints put the stick's pivot {1e3 * aside:.1f} mm aside of its place above the "
+        f"cup (cup.position, stirring.clear_height), {1e3 * along:.1f} mm from its height and "
+        f"{np.degrees(tilt):.0f} deg from its direction, where this stick may be "
+        f"{1e3 * wall:.1f} mm, {1e3 * floor:.1f} mm and "
+        f"{np.degrees(MAX_TILT['stirring']):.0f} deg",
+        "move the pivot there by hand and write down the joints, or correct "
+        "cup.position, robot.stirring_tcp or robot.controller",
+    )
+
+
+def _turns(space: Workspace) -> dict[str, np.ndarray]:
+    """Turn of the tool and of the flange that carries it, in the base frame, shape (3, 3)."""
+    tool = rotation_matrix(space.orientation)
+    return {"tool": tool, "flange": tool @ rotation_matrix(space.tcp[3:]).T}
+
+
+def _angle(first: np.ndarray, second: "np.ndarray | tuple[float, ...]") -> float:
+    """Angle between two directions of length 1 [rad]."""
+    return float(np.arccos(np.clip(np.dot(first, second), -1.0, 1.0)))

@@ -178,7 +178,7 @@ def execute(run: Path, how: ExecutionOptions) -> None:
 
 def typed_sentence(plan: str) -> str:
     """Show the plan, and read what the person types."""
-    from ..hardware.session.confirmation import CONFIRMATION
+    from ..hardware.session.setup import CONFIRMATION
 
     typer.echo(plan)
     if not sys.stdin.isatty():

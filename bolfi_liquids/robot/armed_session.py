@@ -37,7 +37,7 @@ class Task(NamedTuple):
 
     def describe(self) -> str:
         """The plan as a person reads it."""
-        from ..hardware.session.confirmation import describe
+        from ..hardware.session.setup import describe
 
         return f"{self.about}\n{describe(self.paths, self.rig, self.tool)}".lstrip()
 

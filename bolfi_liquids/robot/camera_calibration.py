@@ -36,7 +36,7 @@ def write_board(path: Path) -> Path:
         InputError: There is a file already, or none can be written.
     """
     from ..hardware.vision import CharucoBoard
-    from ..hardware.vision.opencv import opencv
+    from ..hardware.vision.camera_model import opencv
 
     if path.exists():
         raise InputError("exists already", where=str(path), fix="name a file that does not")
@@ -127,8 +127,7 @@ def _read(path: Path) -> list[np.ndarray]:
 
 def _taken(camera: "Camera") -> Pictures:
     """Pictures of the board and of the plumb line, each once a person is ready."""
-    from ..hardware.cameras import CameraError
-    from ..hardware.session.cameras import open_camera
+    from ..hardware.cameras import CameraError, open_camera
 
     with closing(open_camera(camera)) as source:
 
@@ -150,8 +149,8 @@ def _lens(
     camera: "Camera", pictures: Pictures, board: "CharucoBoard"
 ) -> "tuple[Intrinsics | None, CameraModel]":
     """The lens that the board shows, if it does, and the camera with it at the rig's place."""
-    from ..hardware.recorder.views import camera_model, orientation
     from ..hardware.vision import calibrate_intrinsics
+    from ..hardware.vision.stick_view import camera_model, orientation
 
     if not pictures.boards:
         return None, camera_model(camera)

@@ -133,7 +133,7 @@ def plan_pour(chosen: ChosenPour, rig: "Rig") -> "PosePath":
     """
     from ..hardware import check_path
     from ..hardware.motion import pour_path
-    from ..hardware.rig_checks import receiver_fault
+    from ..hardware.rig_file import receiver_fault
 
     # only the cups of the pour say how wide its receiver is
     if fault := receiver_fault(rig, chosen.cups.receiver.radius):

@@ -1,11 +1,11 @@
-"""What every camera gives: frames with the time at which it gave them."""
+"""Protocol of cameras: frames with the time at which a camera gave them."""
 
 from typing import Protocol
 
 import numpy as np
 
+from ..vision.camera_model import opencv
 from ..vision.frame import Frame
-from ..vision.opencv import opencv
 
 
 class CameraError(RuntimeError):

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from ..vision.camera_model import opencv
 from ..vision.frame import Frame
-from ..vision.opencv import opencv
-from .base import CameraError, grey
+from .base import CameraError, FrameSource, grey
 
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 
 
-class FilesCamera:
+class FilesCamera(FrameSource):
     """Reads what was recorded, as fast as it is asked for."""
 
     def __init__(self, path: str | Path, *, rate: float = 30.0) -> None:
@@ -44,18 +44,12 @@ class FilesCamera:
             raise CameraError(f"{path} holds no frame that OpenCV can read")
 
     def read(self) -> Frame | None:
-        """The next frame, None at the end.
-
-        Raises:
-            CameraError: a picture cannot be read.
-        """
         if self._first is not None:
             frame, self._first = self._first, None
             return frame
         return next(self._frames, None)
 
     def close(self) -> None:
-        """Close the file."""
         self._first = None
         self._frames = iter(())
 

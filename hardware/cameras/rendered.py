@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from ..csv_file import CsvAppender
-from ..host_clock import REAL_CLOCK, HostClock
+from ..process import REAL_CLOCK, HostClock
 from ..rendering.drawing import Stage, exposure_times, render
 from ..rendering.world import World
 from ..vision.frame import Frame
+from .base import FrameSource
 
 MAX_LATENESS = 0.2  # s; a camera that is further behind leaves frames out
 TRUTH_COLUMNS = ("index", "stamp", "time", "inclination_xz", "inclination_yz")
@@ -30,7 +31,7 @@ class Timing:
     seed: int = 0
 
 
-class RenderedCamera:
+class RenderedCamera(FrameSource):
     """Shows a world at even times from its start.
 
     A frame that is asked for late still shows its own moment; frames are left out only when the
@@ -64,7 +65,6 @@ class RenderedCamera:
         self._truth = None if truth is None else CsvAppender(truth, TRUTH_COLUMNS)
 
     def read(self) -> Frame | None:
-        """The next frame; waits until it would have arrived."""
         index = self._skip_missed()
         exposed = self._exposed(index)
         self._clock.sleep(exposed + self._timing.latency - self._clock.now())
@@ -80,7 +80,6 @@ class RenderedCamera:
         return Frame(index, stamp, image)
 
     def close(self) -> None:
-        """Close the file of truths."""
         if self._truth is not None:
             self._truth.close()
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from ..vision.camera_model import opencv
 from ..vision.frame import Frame
-from ..vision.opencv import opencv
-from .base import CameraError, grey
+from .base import CameraError, FrameSource, grey
 
 WARM_UP_FRAMES = 5  # the first ones of many webcams are dark or half a picture
 BUFFERS = 3
@@ -15,7 +15,7 @@ MAX_KEPT = 2 * BUFFERS  # pictures; all that a driver has kept, with some to spa
 MIN_WAIT = 1e-3  # s; a picture that comes sooner was waiting for an unknown time
 
 
-class Webcam:
+class Webcam(FrameSource):
     """One webcam, opened by its number or the path of its device."""
 
     def __init__(self, source: int | str, *, size: tuple[int, int], rate: float = 30.0) -> None:
@@ -57,7 +57,6 @@ class Webcam:
         return Frame(self._index - 1, stamp, np.ascontiguousarray(grey(image)))
 
     def close(self) -> None:
-        """Let the device go."""
         self._capture.release()
 
     def _grab(self) -> float:

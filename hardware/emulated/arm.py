@@ -5,17 +5,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arm import WATCHDOG_PERIOD, ArmState, LinkLost, Payload, Six, Tool
-from ..host_clock import REAL_CLOCK, HostClock
-from ..motion.cup_frame import cup_frame
+from ..arm import WATCHDOG_PERIOD, ArmState, LinkLost, PathFollower, Payload, Six, Tool
+from ..motion.poses import cup_frame
+from ..process import REAL_CLOCK, HostClock
 from ..rendering.world import SharedWorld, WorldState
 from ..rig import Rig
 from ..robot.ur import STOP_DECELERATION
 from ..safety.guards import NORMAL, PLAYING, RUNNING_MODE
 from ..safety.limits import TargetCheck, workspace
-from . import replayed_stick as stick
+from . import stick
 from .motion import KinematicArm, MotionError
-from .stick_motion import StickMotion
+from .stick import StickMotion
 
 PROTECTIVE_STOP = 10.0  # m/s2 and rad/s2
 STOPPED = 1  # runtime_state without a program
@@ -59,7 +59,7 @@ class EmulatedController(NamedTuple):
         return EmulatedArm(rig, tool, self)
 
 
-class EmulatedArm:
+class EmulatedArm(PathFollower):
     """An arm without mass, in the process that commands it.
 
     It moves on whenever somebody looks at it or commands it, by all ticks that are due by then. As
@@ -86,12 +86,10 @@ class EmulatedArm:
         self._fed = 0  # tick of the latest set-point
 
     def connect(self) -> None:
-        """Begin to move by the clock."""
         self._ticks = self._due()
         self._show()
 
     def read(self) -> ArmState:
-        """The state after the latest tick."""
         arm = self._arm
         return ArmState(
             time=self.time(),
@@ -108,24 +106,20 @@ class EmulatedArm:
         )
 
     def time(self) -> float:
-        """Controller's clock of the latest tick [s]."""
         self._go_on()
         return self._ticks * self._dt
 
     def payload(self) -> Payload:
-        """What was set; none before that."""
         return self._payload
 
     def close(self) -> None:
         """Nothing to let go."""
 
     def take_control(self) -> None:
-        """Start the program that takes set-points, and set the payload."""
         self._payload = Payload(self._robot.payload, self._robot.payload_centre)
         self._playing = True
 
     def tcp(self) -> Six:
-        """Tool's centre in the flange's frame [m, rad]."""
         return _six(self._arm.tcp)
 
     def allows(self, pose: np.ndarray) -> bool:
@@ -133,23 +127,14 @@ class EmulatedArm:
         return self._arm.reaches(pose)
 
     def arm_watchdog(self) -> None:
-        """From now on the program ends `WATCHDOG_PERIOD` after the last set-point."""
         self._go_on()
         self._guarded, self._fed = True, self._ticks
 
     def command(self, pose: np.ndarray) -> None:
-        """Go to a pose; this also keeps the watchdog quiet, and nothing else does.
-
-        Raises:
-            MotionRejected: It breaks a limit; the arm goes on as before.
-            LinkLost: The program has ended, or `stop` was called.
-        """
         self._go_on()
         self._check(self._arm.pose if self._previous is None else self._previous, pose)
-        if self._stopped:
-            raise LinkLost("the arm was stopped; it takes no set-point any more")
-        if not self._playing:
-            raise LinkLost("the controller's program does not take set-points any more")
+        if self._stopped or not self._playing:
+            raise LinkLost("the controller's program has ended, and takes no set-point any more")
         self._previous, self._fed = pose, self._ticks
         try:
             self._arm.follow(pose)
@@ -157,14 +142,12 @@ class EmulatedArm:
             self._protect()
 
     def stop(self) -> None:
-        """Bring the arm to rest; it takes no further command."""
         self._go_on()
         if self._playing:
             self._end_program(STOP_DECELERATION)
         self._stopped = True
 
     def give_up(self) -> None:
-        """End the program; there is nothing to wait for."""
         self.stop()
 
     def _due(self) -> int:

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..arm import LOOKAHEAD
 from ..motion.kinematics import DhArm, forward, inverse, jacobian
+from ..motion.poses import Trajectory
 from ..motion.stir_paths import PosePath
-from ..motion.trajectory import Trajectory
 from ..robot.ur import SERVO_GAIN
 
 SERVO_RATE = 15.0  # rad/s2; the real arm's is not published
@@ -163,7 +163,7 @@ def oscillator(stiffness: float, damping: float, dt: float) -> tuple[float, floa
 
 
 def servoed(path: PosePath) -> Trajectory:
-    """Where the emulated arm is while it is servoed along a path, in the path's frame.
+    """Way of the emulated arm that is servoed along a path, in the path's frame.
 
     It lags by some 0.1 s and rounds corners off by 1 to 2 mm. The servo acts on joints; over a
     cup's width the same filter acts on positions.

@@ -12,16 +12,16 @@ from ..arm import Tool
 from ..cameras.base import FrameSource
 from ..cameras.rendered import RenderedCamera, Timing
 from ..errors import RigError
-from ..host_clock import REAL_CLOCK
-from ..motion.cup_frame import cup_frame
 from ..motion.kinematics import inverse
-from ..recorder.names import truth_file
-from ..recorder.views import camera_model, scene
+from ..motion.poses import cup_frame
+from ..process import REAL_CLOCK
+from ..recorder.directory import truth_file
 from ..rendering import BRIGHT_STICK, Look, SharedWorld, WorldState, prepare
 from ..rig import Rig, View
 from ..safety.limits import workspace
+from ..vision.stick_view import camera_model, scene
 from .arm import EmulatedController
-from .stick_motion import StickMotion, checked
+from .stick import StickMotion, checked
 
 # what tells the emulated views apart
 _SEEDS: dict[View, int] = {"xz": 1, "yz": 2}
@@ -30,7 +30,7 @@ STALL_SECONDS = 1.0  # s, in which neither the arm nor its cameras move on
 
 @dataclass(frozen=True)
 class HiddenLiquid:
-    """What the emulated stick dips into; its density is the rig's.
+    """Liquid into which the emulated stick dips; its density is the rig's.
 
     Attributes:
         viscosity: Dynamic [Pa s].

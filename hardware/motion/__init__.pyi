@@ -1,5 +1,6 @@
 from .patterns import circle as circle
 from .patterns import star as star
+from .poses import Trajectory as Trajectory
 from .pour_paths import approach_pour as approach_pour
 from .pour_paths import pour_path as pour_path
 from .pour_paths import ready_to_pour as ready_to_pour
@@ -11,4 +12,3 @@ from .stir_paths import joined as joined
 from .stir_paths import retract as retract
 from .stir_paths import stir as stir
 from .stir_paths import strokes as strokes
-from .trajectory import Trajectory as Trajectory

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .trajectory import Trajectory
+from .poses import Trajectory
 
 
 def star(  # noqa: PLR0913  a pattern has that many sizes
@@ -33,7 +33,7 @@ def star(  # noqa: PLR0913  a pattern has that many sizes
     Raises:
         ValueError: an argument is not positive and finite, or `points` is even or below 5.
     """
-    _check_positive(
+    check_positive(
         speed=speed,
         height=height,
         radius=radius,
@@ -73,7 +73,8 @@ def star_vertices(points: int, radius: float) -> np.ndarray:
     return radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
-def _check_positive(**sizes: float) -> None:
+def check_positive(**sizes: float) -> None:
+    """Raise `ValueError` that names the first which is not positive and finite."""
     for name, value in sizes.items():
         if not (np.isfinite(value) and value > 0):
             raise ValueError(f"{name} must be positive and finite, got {value}")
@@ -117,7 +118,7 @@ def circle(
     Raises:
         ValueError: an argument is not positive and finite, or there are fewer than 2 turns.
     """
-    _check_positive(speed=speed, height=height, radius=radius, rest=rest, rate=rate)
+    check_positive(speed=speed, height=height, radius=radius, rest=rest, rate=rate)
     if not (np.isfinite(turns) and turns >= 2):
         raise ValueError(f"turns must be at least 2, got {turns}")
     duration = turns * 2.0 * np.pi * radius / speed

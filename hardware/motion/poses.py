@@ -6,8 +6,11 @@ scipy's Rotation, a rotation vector 1 us and 47 us, where 10 us are the limit.
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+
+from ..rig import CupSettings
 
 Numbers = Sequence[float] | np.ndarray
 
@@ -84,3 +87,38 @@ def pose_matrix(pose: Numbers) -> np.ndarray:
 def matrix_pose(matrix: np.ndarray) -> np.ndarray:
     """The pose, shape [6], of a homogeneous transform."""
     return np.concatenate([matrix[:3, 3], rotation_vector(matrix)])
+
+
+class CupFrame(NamedTuple):
+    """Place of the cup: origin [m], shape (3,), and axes (columns), in the base frame."""
+
+    origin: np.ndarray
+    axes: np.ndarray
+
+    def to_base(self, pose: np.ndarray) -> np.ndarray:
+        """Poses with the position in the base frame; turns are in it already.
+
+        Args:
+            pose: Position [m] in the cup's frame and rotation vector [rad] in the base frame,
+                shape (..., 6).
+        """
+        return np.concatenate([self.origin + pose[..., :3] @ self.axes.T, pose[..., 3:]], axis=-1)
+
+    def from_base(self, pose: np.ndarray) -> np.ndarray:
+        """Undo `to_base`."""
+        return np.concatenate([(pose[..., :3] - self.origin) @ self.axes, pose[..., 3:]], axis=-1)
+
+
+def cup_frame(cup: CupSettings) -> CupFrame:
+    """The frame of a rig's cup."""
+    yaw = np.radians(cup.yaw_deg)
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    axes = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    return CupFrame(np.array(cup.position), axes)
+
+
+class Trajectory(NamedTuple):
+    """Times [s], shape [T], increasing, and positions [m], shape [T, 3], in the cup's frame."""
+
+    time: np.ndarray
+    position: np.ndarray

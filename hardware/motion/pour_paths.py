@@ -7,7 +7,8 @@ upright and leaves upwards, as in "To Stir or Not to Stir" (angular velocity and
 import numpy as np
 
 from ..rig import Rig
-from .cup_frame import cup_frame
+from .patterns import check_positive
+from .poses import cup_frame
 from .stir_paths import PosePath, placed, profile, travel, turn_rate, up_and_over
 
 RAMP_SECONDS = 0.1  # s, in which the turn reaches its angular velocity, and in which it ends
@@ -33,7 +34,7 @@ def ready_to_pour(rig: Rig, distance: float, lip_height: float) -> np.ndarray:
 
 
 def approach_pour(rig: Rig, pose: np.ndarray, *, distance: float, lip_height: float) -> PosePath:
-    """From where the lip is to `ready_to_pour`: straight up, then sideways, then down.
+    """Path of the lip to `ready_to_pour`: straight up, then sideways, then down.
 
     Args:
         rig: What is known of the place.
@@ -70,7 +71,11 @@ def pour_path(
     Raises:
         ValueError: a number is not finite, or the angular velocity or the angle not positive.
     """
-    _check(angular_velocity, final_angle, (distance, lip_height, hold))
+    check_positive(angular_velocity=angular_velocity, final_angle=final_angle)
+    if not np.isfinite((distance, lip_height, hold)).all() or hold < 0:
+        raise ValueError(
+            f"distance, lip_height and hold must be finite, got {distance, lip_height, hold}"
+        )
     ready = ready_to_pour(rig, distance, lip_height)
     low = placed(ready, z=ready[2] - rig.pouring.approach_height)
     dt = 1.0 / rig.robot.rate
@@ -112,14 +117,6 @@ def upright_again(rig: Rig, path: PosePath, at: float) -> PosePath:
         return PosePath(dt * np.arange(2), np.stack([here, here]), False)
     pose = _tilted(here, turn / angle, way.travelled(_samples(way.duration, dt)))
     return PosePath(dt * np.arange(len(pose)), pose, False)
-
-
-def _check(angular_velocity: float, final_angle: float, others: tuple[float, ...]) -> None:
-    for name, value in (("angular_velocity", angular_velocity), ("final_angle", final_angle)):
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name} must be positive and finite, got {value}")
-    if not np.isfinite(others).all() or others[-1] < 0:
-        raise ValueError(f"distance, lip_height and hold must be finite, got {others}")
 
 
 def _heading(rig: Rig) -> np.ndarray:

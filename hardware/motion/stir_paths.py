@@ -28,7 +28,7 @@ class PosePath(NamedTuple):
 
     @property
     def duration(self) -> float:
-        """From the first sample to the last [s]."""
+        """Time from the first sample to the last [s]."""
         return float(self.time[-1])
 
 
@@ -41,11 +41,11 @@ class Profile(NamedTuple):
 
     @property
     def duration(self) -> float:
-        """Of the whole way [s]."""
+        """Duration of the whole way [s]."""
         return self.length / self.peak + self.ramp if self.length > 0.0 else 0.0
 
     def travelled(self, elapsed: np.ndarray) -> np.ndarray:
-        """Of the length after `elapsed` [s]; the times may lie before the start or past the end."""
+        """Length covered after `elapsed` [s], which may lie before the start or past the end."""
         if self.length == 0.0:
             return np.zeros_like(elapsed)
         within = np.clip(elapsed, 0.0, self.duration)
@@ -59,7 +59,7 @@ def profile(length: float, speed: float, acceleration: float) -> Profile:
 
 
 def approach(rig: Rig, pose: np.ndarray) -> PosePath:
-    """From where the tool is to above the cup's axis: straight up, then sideways, then down.
+    """Path of the tool to above the cup's axis: straight up, then sideways, then down.
 
     Args:
         rig: What is known of the place.
@@ -69,7 +69,7 @@ def approach(rig: Rig, pose: np.ndarray) -> PosePath:
 
 
 def up_and_over(rig: Rig, pose: np.ndarray, target: np.ndarray, speed: float) -> PosePath:
-    """From one pose to another: straight up, then sideways, then down."""
+    """Path from one pose to another: straight up, then sideways, then down."""
     high = max(pose[2], target[2])
     corners = [pose, placed(pose, z=high), placed(target, z=high), target]
     return travel(rig, corners, speed)

@@ -15,10 +15,9 @@ from ..board import host_time
 from ..errors import RigError
 from ..rig import Rig, View
 from ..vision.camera_model import CameraModel, as_fields, from_fields
+from ..vision.stick_view import camera_model
 from .events import EVENTS, FULL, drop_reserve, make_reserve, read_events
-from .names import frames_file, truth_file, video_file
-from .sample import SAMPLES
-from .views import camera_model
+from .samples import SAMPLES
 
 RIG = "rig.json"
 VIEWS: tuple[View, View] = ("xz", "yz")
@@ -28,8 +27,23 @@ WAY_TIME = 30.0  # [s] from and to where the arm waits, at the most
 SPARE_SPACE = 2.0  # times the need
 
 
+def frames_file(view: View) -> str:
+    """Name of the table of a view's frames."""
+    return f"frames_{view}.csv"
+
+
+def video_file(view: View) -> str:
+    """Name of a view's video."""
+    return f"{view}.mkv"
+
+
+def truth_file(view: View) -> str:
+    """Name of the table of what a view's rendered frames truly showed."""
+    return f"truth_{view}.csv"
+
+
 class Provenance(NamedTuple):
-    """What a directory's rig.json tells.
+    """Content of a directory's rig.json.
 
     Attributes:
         rig: The rig that was recorded.
@@ -127,7 +141,7 @@ def rig_hash(rig: Rig) -> str:
 
 
 def expected_bytes(rig: Rig, duration: float, *, videos: bool = True) -> float:
-    """What a recording that lasts `duration` [s] may need on the disk."""
+    """Bytes that a recording of `duration` [s] may need on the disk."""
     cameras = rig.cameras if videos else ()
     pixels = sum(camera.width * camera.height * camera.rate for camera in cameras)
     per_second = BYTES_PER_PIXEL * pixels + SAMPLE_BYTES * rig.robot.rate
@@ -135,7 +149,7 @@ def expected_bytes(rig: Rig, duration: float, *, videos: bool = True) -> float:
 
 
 def read_provenance(directory: Path) -> Provenance:
-    """What `start_directory` wrote.
+    """Read what `start_directory` wrote.
 
     Raises:
         RigError: There is no rig.json, or it is damaged.
@@ -152,15 +166,11 @@ def read_provenance(directory: Path) -> Provenance:
             started=written["started"],
             extra=written["extra"],
         )
-    except FileNotFoundError as err:
-        raise RigError(
-            f"no {RIG}", where=str(directory), fix="give the directory of a recording"
-        ) from err
     except (OSError, ValueError, ValidationError, KeyError, TypeError) as err:
         raise RigError(
             f"cannot be used ({type(err).__name__}: {err})",
             where=str(path),
-            fix="restore it: no recording can be made without it",
+            fix="give the directory of a recording, or restore it: none can be made without it",
         ) from err
 
 

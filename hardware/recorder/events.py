@@ -3,16 +3,24 @@
 import errno
 import json
 import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from ..board import host_time
+from ..board import Trouble, host_time
 
 EVENTS = "events.jsonl"
 RESERVE = ".reserve"  # given up when the disk is full, so that the reason can still be written
 RESERVE_PARTS = 16  # one for each event: what is free, the other writers take at once
 RESERVE_BYTES = 16_384  # of each
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # how a disk says that there is no room
+CONTROL = "control"  # the source whose word counts
+DETAILS = Trouble.BAD_STAMPS.kind, Trouble.WRITE_FAILED.kind
+TROUBLES = (*DETAILS, Trouble.SOURCE_LOST.kind, Trouble.SAME_PICTURE.kind, "refused", "failed")
+SILENT = "the session ended without a word: it was killed, or power was lost"
+
+Events = Sequence[dict[str, Any]]
 
 
 class EventLog:
@@ -93,3 +101,100 @@ def read_events(directory: Path) -> list[dict[str, Any]]:
         if isinstance(event, dict) and "kind" in event:
             events.append(event)
     return events
+
+
+class Disk:
+    """Carries out writes until one fails; tells the reason once, and writes no more.
+
+    Attributes:
+        trouble: What to complain of on the board.
+        slowest: Longest time that a write has taken [s].
+    """
+
+    def __init__(self, log: EventLog):
+        self.trouble = Trouble.NONE
+        self.slowest = 0.0
+        self._log = log
+
+    def write[T](self, name: str, act: Callable[[], T]) -> T | None:
+        """Write to the file `name` by `act`; returns its result, None once a write has failed."""
+        if self.trouble is Trouble.WRITE_FAILED:
+            return None
+        start = host_time()
+        try:
+            return act()
+        except OSError as err:
+            self.trouble = Trouble.WRITE_FAILED
+            cure = " (make room)" if err.errno in FULL else ""
+            reason = f"{name}: {err.strerror or err}{cure}"
+            self.tell(self.trouble.kind, file=name, reason=reason)
+        finally:
+            self.slowest = max(self.slowest, host_time() - start)
+        return None
+
+    def tell(self, kind: str, **fields: Any) -> None:
+        """Write an event, if it can be written at all; the board tells of trouble besides."""
+        with suppress(OSError):
+            self._log.write(kind, **fields)
+
+
+@contextmanager
+def writing(directory: Path, source: str) -> Iterator[Disk]:
+    """The disk and the events of a process; an error that ends it leaves its reason there."""
+    with closing(EventLog(directory, source)) as log:
+        disk = Disk(log)
+        try:
+            yield disk
+        except Exception as err:
+            disk.tell("failed", reason=f"{type(err).__name__}: {err}")
+            raise
+
+
+class Outcome(NamedTuple):
+    """Status ("complete" or "aborted") and the reason for it."""
+
+    status: str
+    reason: str
+
+
+def outcome(events: Events, cut: str = "") -> Outcome:
+    """Complete only if control has said that the plan was carried out, and nothing is cut off.
+
+    Args:
+        events: Of the session, oldest first.
+        cut: Why the recorded stir ends early; empty where it does not.
+    """
+    told = [event for event in events if event["kind"] == "stopped"]
+    told += [event for event in events if event["kind"] in TROUBLES]
+    if told:
+        return Outcome("aborted", detailed(_reason(told[0]), told[1:]))
+    if not _carried_out(events):
+        return Outcome("aborted", f"{SILENT} ({cut})" if cut else SILENT)
+    return Outcome("aborted", cut) if cut else Outcome("complete", "the plan was carried out")
+
+
+def detailed(reason: str, events: Events) -> str:
+    """Why a session ended, with what control does not know.
+
+    Control tells only that stamps are bad or that something is not written; the process that has
+    complained of it says from which frame on, or which file and why.
+    """
+    known = (event for event in events if event["kind"] in DETAILS)
+    return "; ".join([reason, *[_reason(event) for event in known][:1]])
+
+
+def _carried_out(events: Events) -> bool:
+    """Whether control began a stir, was done with all that it began, and left."""
+    said = [event for event in events if event.get("source") == CONTROL]
+    began = [event for event in said if event["kind"] == "began"]
+    done = {event.get("number") for event in said if event["kind"] == "done"}
+    stirred = any(event.get("stirring") for event in began)
+    left = any(event["kind"] == "left" for event in said)
+    return stirred and left and all(event.get("number") in done for event in began)
+
+
+def _reason(event: dict[str, Any]) -> str:
+    reason = str(event.get("reason") or "no reason given")
+    if event["kind"] == "stopped":
+        return reason
+    return f"{event.get('source')}: {event['kind'].replace('_', ' ')}: {reason}"

@@ -9,12 +9,10 @@ import numpy as np
 
 from ..netcdf import netcdf_content
 from ..rig import Rig
-from ..vision.frame_measurement import BAD_LINE, Flag
+from ..vision.frame import BAD_LINE, Flag
 from .directory import VIEWS
-from .events import drop_reserve, read_events
-from .outcome import outcome
-from .raw import Raw, lost_rows, missed, read_raw
-from .stir import Stir, extract_stir
+from .events import drop_reserve, outcome, read_events
+from .stir import Raw, Stir, extract_stir, lost_rows, missed, read_raw
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -63,7 +61,7 @@ def partial(directory: str | Path, until: float = np.inf) -> Stir:
 
 
 def rig_attributes(rig: Rig) -> dict[str, float]:
-    """What a recording tells of its rig: lengths [m], mass [kg], density [kg/m3], speed [m/s]."""
+    """Attributes that a rig gives: lengths [m], mass [kg], density [kg/m3], speed [m/s]."""
     return {
         "cup_radius": rig.cup.radius,
         "cup_height": rig.cup.height,

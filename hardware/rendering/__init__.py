@@ -1,8 +1,7 @@
 """Synthetic pictures of the stirring scene, for rehearsals and as the truth of tests."""
 
 from ..vision.stick_view import Scene
-from .drawing import Stage, exposure_times, prepare, render
-from .look import BRIGHT_STICK, Look
+from .drawing import BRIGHT_STICK, Look, Stage, exposure_times, prepare, render
 from .world import SharedWorld, World, WorldState, direction
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""What the rendered cameras look at: where the gripper is and how the stick hangs.
+"""The scene before rendered cameras: where the gripper is and how the stick hangs.
 
 In shared memory one process moves it, and cameras in other processes look at it. As on the board, a
 number is one aligned double and nobody waits: whoever looks leaves out the rows that may be in the

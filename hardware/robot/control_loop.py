@@ -1,11 +1,18 @@
-"""The motion loop: it reads the arm, asks the guards, sends the next set-point, hands on a sample.
+"""The control process: it alone owns the robot, and may die without taking the recording along.
+
+Its motion loop reads the arm, asks the guards, sends the next set-point, hands on a sample.
 
 It runs on an absolute clock. A set-point is also what keeps the controller's watchdog quiet.
 Any fault stops the arm permanently. Nothing resumes; start a new session.
 """
 
+import os
+import signal
+import sys
+from collections.abc import Callable
 from functools import partial
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -13,16 +20,14 @@ import numpy as np
 from ..arm import LOOKAHEAD, WATCHDOG_PERIOD, ArmState, LinkLost, PathFollower
 from ..board import Board, Row, Trouble, Who
 from ..errors import RigError
-from ..host_clock import REAL_CLOCK, HostClock
-from ..motion.cup_frame import cup_frame
+from ..motion.poses import cup_frame
 from ..motion.pour_paths import upright_again
-from ..priority import hurry, quieten
+from ..process import REAL_CLOCK, HostClock, hurry, quieten
 from ..recorder.events import EventLog
-from ..recorder.rate import Rate, counted, no_rate
-from ..recorder.sample import Sample
+from ..recorder.samples import Sample
 from ..safety.guards import Reading, Rules, Seen, Trip, evaluate, first_watch, tripped, watched
 from ..safety.limits import turn_between, workspace
-from .order_queue import Inbox, Vetting
+from ..safety.preflight import failures
 from .orders import (
     Ask,
     Assignment,
@@ -37,9 +42,8 @@ from .orders import (
     fingerprint,
     report_to,
 )
-from .path_queue import Course, Leg, Trail, advanced, queued
-from .preparation import Prepared, others
-from .sample_queue import Outlet
+from .preparation import Prepared, others, prepare
+from .queues import Course, Inbox, Leg, Outlet, Trail, Vetting, advanced, queued
 
 SETTLING_PERIODS = 3  # until the controller's program listens again after an order it answers
 CHECK_ROOM = 0.5  # of a period, that must be left of it for a slice of a path's check
@@ -83,7 +87,7 @@ def _nearer(age: float, period: float) -> float:
 
 
 class Links(NamedTuple):
-    """What the loop is joined to.
+    """Connections of the loop.
 
     Attributes:
         board: Where the processes leave signs of life.
@@ -141,7 +145,7 @@ class ControlLoop:
         self._still = 0
         self._ticks = 0
         self._worst = 0.0
-        self._rate: Rate = no_rate(self._clock.now())
+        self._begun = self._clock.now()
 
     def run(self) -> int:
         """The loop from its first tick to the arm's rest; the process's exit code."""
@@ -242,7 +246,7 @@ class ControlLoop:
         return None
 
     def _cause(self) -> Trip | None:
-        """What the controller says of why it takes no set-points, if it does so at once."""
+        """Why the controller takes no set-points, if it says so within `CAUSE_PERIODS`."""
         end = self._clock.now() + CAUSE_PERIODS * self._period
         while self._clock.now() < end:
             self._clock.sleep(0.25 * self._period)
@@ -384,8 +388,59 @@ class ControlLoop:
         self._outlet.put(Sample._make((self._ticks, state.time, now, *numbers, *last)))
         self._ticks += 1
         self._worst = max(self._worst, late)
-        self._rate = counted(self._rate, 1, now)
+        rate = self._ticks / max(now - self._begun, self._period)
         trouble = Trouble.NONE if self._trip is None else Trouble.STOPPED
         share = self._course.at / len(leg.base) if leg is not None else float("nan")
-        row = Row(now, trouble, self._ticks, self._rate.rate, share, self._worst)
+        row = Row(now, trouble, self._ticks, rate, share, self._worst)
         self._board.write(Who.CONTROL, row)
+
+
+def run_control(
+    assignment: Assignment, board: Board, orders: Connection, samples: Connection
+) -> None:
+    """Look at the arm, and if the pre-flight list is clean and it is armed, follow orders.
+
+    The process ends with this function.
+
+    Args:
+        assignment: What to do; without `armed` nothing can move the arm.
+        board: Where the processes leave signs of life.
+        orders: To main: its orders, our reports; its end stops the arm.
+        samples: To the recorder; nobody else may hold this end.
+    """
+    log = EventLog(Path(assignment.directory), "control")
+    links = Links(board, orders, samples, log, [])
+    # nothing moves yet, and connecting waits for a controller that may never answer
+    _on_signals(lambda *_: os._exit(1))
+    code = 1
+    try:
+        prepared = checked(assignment, links)
+        if prepared is not None:
+            _on_signals(lambda number, _: links.signals.append(signal.Signals(number).name))
+            code = ControlLoop(assignment, prepared, links).run()
+    except Exception as err:
+        log.write("failed", reason=f"{type(err).__name__}: {err}")
+        report_to(orders, Stopped(f"the control process failed: {err}", "failed"))
+        raise
+    finally:
+        sys.stderr.flush()
+        # ur_rtde's destructors may wait or crash once a link was lost
+        os._exit(code)
+
+
+def _on_signals(act: Callable[[int, object], None]) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, act)
+
+
+def checked(to: Assignment, links: Links, clock: HostClock = REAL_CLOCK) -> Prepared | None:
+    """Go through the pre-flight list and write it down; None unless it is clean."""
+    prepared = prepare(to, partial(others, to, links.board), clock)
+    checks = prepared.checks
+    links.log.write("checked", checks=[list(check) for check in checks], armed=to.armed)
+    failed = failures(checks)
+    if not failed:
+        return prepared
+    links.log.write("refused", reason=failed)
+    report_to(links.orders, Checked(checks, None, None))
+    return None

@@ -14,7 +14,7 @@ from ..safety.preflight import Check
 
 
 class Assignment(NamedTuple):
-    """What a control process is for.
+    """Task of a control process.
 
     Attributes:
         rig: Its limits and its robot.

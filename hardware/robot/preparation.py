@@ -9,18 +9,16 @@ import numpy as np
 from ..arm import ArmReader, ArmState, LinkLost, PathFollower
 from ..board import Board, Row, Who
 from ..errors import RigError
-from ..host_clock import REAL_CLOCK, HostClock
-from ..safety.guards import CAMERAS
+from ..process import REAL_CLOCK, HostClock
+from ..safety.guards import CAMERAS, PLAYING
 from ..safety.preflight import (
     Check,
     arm_checks,
     disk_check,
     failures,
-    limits_check,
     mounted_checks,
     payload_check,
     process_checks,
-    program_check,
 )
 from .orders import Assignment
 
@@ -29,7 +27,7 @@ WAIT_FOR_OTHERS = 15.0  # s, for recorder and cameras to show signs of life
 
 
 class Prepared(NamedTuple):
-    """What the list said.
+    """The pre-flight list, and the arm that it is about.
 
     Attributes:
         reader: Of the arm; connected, as far as that went.
@@ -96,11 +94,14 @@ def _take_control(
 ) -> list[ArmState]:
     arm.take_control()
     states = _look(arm, 1.0 / to.rig.robot.rate, clock)
-    checks.append(program_check(states[-1]))
+    runtime = states[-1].runtime_state
+    checks.append(Check("program", runtime == PLAYING, f"runtime_state = {runtime}"))
     checks.append(payload_check(arm.payload(), to.rig, ours=True))
     checks.extend(mounted_checks(states[-1], arm.tcp(), to.rig, to.tool))
     if len(to.probes):
-        checks.append(limits_check([arm.allows(pose) for pose in to.probes]))
+        allowed = [arm.allows(pose) for pose in to.probes]
+        text = f"{sum(allowed)} of {len(allowed)} poses of the plan are within them"
+        checks.append(Check("controller's limits", all(allowed), text))
     return states
 
 

@@ -14,7 +14,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arm import LOOKAHEAD, WATCHDOG_PERIOD, ArmState, LinkLost, Payload, Six, Tool
+from ..arm import (
+    LOOKAHEAD,
+    WATCHDOG_PERIOD,
+    ArmReader,
+    ArmState,
+    LinkLost,
+    PathFollower,
+    Payload,
+    Six,
+    Tool,
+)
 from ..errors import RigError, missing_extra
 from ..rig import Rig
 from ..safety.limits import TargetCheck
@@ -41,7 +51,7 @@ RTDE_FIELDS = [
 _READS = 3  # tries to read all fields of one package
 
 
-class URReader:
+class URReader(ArmReader):
     """Reads the state of an arm; has no connection over which it could move it."""
 
     def __init__(self, address: str, rate: float):
@@ -70,11 +80,9 @@ class URReader:
         return state
 
     def time(self) -> float:
-        """Controller's clock of the latest state [s]; a look for whether there is a new one."""
         return self._receive.getTimestamp()
 
     def payload(self) -> Payload:
-        """What the controller says hangs on the flange."""
         return Payload(self._receive.getPayload(), tuple(self._receive.getPayloadCog()))
 
     def close(self) -> None:
@@ -119,7 +127,7 @@ class URReader:
             ) from err
 
 
-class URArm(URReader):
+class URArm(URReader, PathFollower):
     """Moves an arm along set-points; its limits come with it and cannot be left out."""
 
     def __init__(self, rig: Rig, address: str, tool: Tool):
@@ -129,7 +137,6 @@ class URArm(URReader):
         self._check = TargetCheck(rig, tool)
         self._control: Any = None
         self._previous: np.ndarray | None = None
-        self._guarded = False
         self._braking: Thread | None = None
 
     def take_control(self) -> None:
@@ -146,29 +153,20 @@ class URArm(URReader):
         del starter  # which disconnects: input registers have one owner
         # what it finds running it never starts again, whenever it reconnects
         self._control = self._opened(control, self._address, self._rate, control.FLAG_NO_WAIT)
-        self.mount(self._tcp)
+        if not self._control.setTcp(list(self._tcp)):
+            raise LinkLost("the controller did not take the tool's centre")
         if not self._control.setPayload(self._robot.payload, list(self._robot.payload_centre)):
             raise LinkLost("the controller did not take the payload")
 
-    def mount(self, tcp: Six) -> None:
-        """Set the tool's centre in the flange's frame; at rest only, waits for the answer."""
-        if self._guarded:
-            raise LinkLost("the tool's centre cannot be changed once the watchdog runs")
-        if not self._control.setTcp(list(tcp)):
-            raise LinkLost("the controller did not take the tool's centre")
-        self._previous = None
-
     def tcp(self) -> Six:
-        """Tool's centre in the flange's frame [m, rad]; waits for the controller's answer."""
         x, y, z, rx, ry, rz = self._control.getTCPOffset()
         return x, y, z, rx, ry, rz
 
     def allows(self, pose: np.ndarray) -> bool:
-        """Whether the controller's own safety limits allow a pose; waits for its answer."""
         return bool(self._control.isPoseWithinSafetyLimits(list(pose)))
 
     def arm_watchdog(self) -> None:
-        """From now on the controller ends its program 0.1 s after the last set-point.
+        """Make the controller end its program 0.1 s after the last set-point.
 
         An upload would disarm it; none follows.
 
@@ -177,7 +175,6 @@ class URArm(URReader):
         """
         if not self._control.setWatchdog(1.0 / WATCHDOG_PERIOD):
             raise LinkLost("the controller did not take the watchdog")
-        self._guarded = True
 
     def command(self, pose: np.ndarray) -> None:
         """Send a set-point; it also keeps the watchdog quiet, and nothing else does.
@@ -212,7 +209,6 @@ class URArm(URReader):
             self._braking.start()
 
     def give_up(self) -> None:
-        """End the controller's program, on an arm at rest; waits for it, but not for ever."""
         self.stop()
         assert self._braking is not None
         self._braking.join(PROGRAM_ENDS)

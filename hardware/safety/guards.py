@@ -53,7 +53,7 @@ CAMERAS = (Who.CAMERA_XZ, Who.CAMERA_YZ)
 
 
 class GuardState(NamedTuple):
-    """What is remembered from tick to tick.
+    """State of the guards from tick to tick.
 
     Attributes:
         time: Of the latest package, the controller's clock [s].
@@ -95,7 +95,7 @@ class Seen(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """What the guards hold a tick against: the rig's limits and the box of the tool."""
+    """Limits of the guards: the rig's, and the box of the tool."""
 
     limits: Limits
     box: AxisLimits
@@ -116,7 +116,7 @@ class Reading(NamedTuple):
 
     @property
     def margin(self) -> float:
-        """What is left of the limit, as a share of it; negative when it is passed."""
+        """Rest of the limit, as a share of it; negative when it is passed."""
         return 1.0 - self.value / self.limit
 
 
@@ -133,7 +133,7 @@ def first_watch(state: ArmState, now: float, wrench: tuple[float, ...]) -> Guard
 
 
 def watched(watch: GuardState, state: ArmState, now: float, period: float) -> GuardState:
-    """What is remembered after another state, read at host time `now` [s]."""
+    """State of the guards after another state of the arm, read at host time `now` [s]."""
     if state.time <= watch.time:
         return watch
     offset = min(watch.offset + MAX_CLOCK_DRIFT * period, now - state.time)

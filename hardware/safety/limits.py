@@ -1,17 +1,17 @@
-"""What a motion must keep before it may begin, and each of its set-points on the way.
+"""Limits of a motion before it may begin, and of each of its set-points on the way.
 
 A path that breaks a limit is refused as a whole; nothing is clipped.
 """
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 from typing import NamedTuple
 
 import numpy as np
 
 from ..arm import Tool
 from ..errors import MotionRejected
-from ..motion.cup_frame import cup_frame
 from ..motion.kinematics import ARMS, DhArm, follow, inverse
+from ..motion.poses import cup_frame
 from ..motion.stir_paths import PosePath
 from ..rig import AxisLimits, Limits, Rig
 
@@ -24,9 +24,11 @@ JOINT_AGREEMENT = 0.1  # rad, of the arm's own joints with ours; another configu
 MOST_SAMPLES = 150_000  # 20 minutes
 SLICE_SAMPLES = 20  # samples, whose check lasts some thousandths of a second
 
+Refusals = Iterable[tuple[bool, str, str]]  # whether it is refused, what is wrong, and where
+
 
 class Workspace(NamedTuple):
-    """Where one tool may go and which arm carries it.
+    """Range of one tool, and the arm that carries it.
 
     Attributes:
         box: Range of the tool's centre, in the cup's frame.
@@ -46,7 +48,7 @@ class Workspace(NamedTuple):
 
 
 def workspace(rig: Rig, tool: Tool) -> Workspace:
-    """What a rig's file says about one of its two tools."""
+    """Workspace of one of a rig's two tools."""
     robot = rig.robot
     return Workspace(
         box=getattr(rig.limits, tool),
@@ -92,19 +94,19 @@ def path_checks(
     path: PosePath, rig: Rig, tool: Tool, *, joints: np.ndarray | None = None
 ) -> Generator[None, None, np.ndarray]:
     """`check_path` slice by slice, for who has something else to do in between."""
-    _check_numbers(path, rig.robot.rate)
+    _refuse(_numbers(path, rig.robot.rate))
     space = workspace(rig, tool)
     now = np.empty(6)
     for start in range(0, len(path.time), SLICE_SAMPLES):
         part = _part(path, start)
-        _check_rates(part, rig.limits)
-        _check_turns(part, space, rig.limits)
-        _check_box(part, space.box, rig.limits)
+        _refuse(_rates(part, rig.limits))
+        _refuse(_turns(part, space, rig.limits))
+        _refuse(_places(part, space.box, rig.limits))
         if tool == "stirring":
-            _check_tip(part, rig)
+            _refuse(_tip(part, rig))
         if start == 0:
             now = _first_joints(cup_frame(rig.cup).to_base(path.pose[0]), space, joints)
-        now = _check_reach(part, space, rig, now)
+        now = _reached(part, space, rig, now)
         yield
     return now
 
@@ -143,7 +145,7 @@ def _part(path: PosePath, start: int) -> _Part:
 
 
 def margin(speed: np.ndarray | float, limits: Limits) -> np.ndarray | float:
-    """How far the arm still goes after a stop is ordered at `speed` [m/s], in [m]."""
+    """Way [m] that the arm still goes after a stop is ordered at `speed` [m/s]."""
     return speed**2 / (2.0 * limits.acceleration) + speed * limits.latency
 
 
@@ -151,11 +153,10 @@ class TargetCheck:
     """The check of each set-point, for a driver: cheap, and the last one before the wire."""
 
     def __init__(self, rig: Rig, tool: Tool):
-        space, self._dt = workspace(rig, tool), 1.0 / rig.robot.rate
         self._frame = cup_frame(rig.cup)
-        self._box = space.box
-        self._step = rig.limits.speed * self._dt
-        self._turn = np.radians(rig.limits.tilt_rate_deg_s) * self._dt
+        self._box = workspace(rig, tool).box
+        self._step = rig.limits.speed / rig.robot.rate
+        self._turn = np.radians(rig.limits.tilt_rate_deg_s) / rig.robot.rate
 
     def __call__(self, previous: np.ndarray, target: np.ndarray) -> None:
         """Refuse a set-point that is not finite, outside the box or too far from the last.
@@ -167,22 +168,21 @@ class TargetCheck:
         Raises:
             MotionRejected: naming field, value and limit.
         """
-        if target.shape != (6,) or not np.isfinite(target).all():
-            raise _rejected(f"the pose {target.tolist()} is not six finite numbers", "set-point")
-        position = self._frame.from_base(target)[:3]
-        outside = (position < self._box.low - 1e-9) | (position > self._box.high + 1e-9)
-        if outside.any():
-            axis = int(outside.argmax())
-            low, high = self._box.low[axis], self._box.high[axis]
-            raise _rejected(
-                f"{'xyz'[axis]} = {position[axis]:.4f} m is outside [{low}, {high}] m", "set-point"
-            )
+        _refuse(self._refusals(previous, target))
+
+    def _refusals(self, previous: np.ndarray, target: np.ndarray) -> Refusals:
+        six = target.shape == (6,) and bool(np.isfinite(target).all())
+        yield not six, f"the pose {target.tolist()} is not six finite numbers", "set-point"
+        position, low, high = self._frame.from_base(target)[:3], self._box.low, self._box.high
+        outside = (position < low - 1e-9) | (position > high + 1e-9)
+        k = int(outside.argmax())
+        what = f"{'xyz'[k]} = {position[k]:.4f} m is outside [{low[k]}, {high[k]}] m"
+        yield bool(outside.any()), what, "set-point"
         step = float(np.linalg.norm(target[:3] - previous[:3]))
-        if step > self._step * (1.0 + SPEED_ROUNDING) + 1e-9:
-            raise _rejected(f"a step of {step:.5f} m is above {self._step:.5f} m", "set-point")
         turn = turn_between(previous[3:], target[3:])
-        if turn > self._turn * (1.0 + SPEED_ROUNDING) + 1e-9:
-            raise _rejected(f"a turn of {turn:.5f} rad is above {self._turn:.5f} rad", "set-point")
+        for name, value, most in (("step", step, self._step), ("turn", turn, self._turn)):
+            beyond = value > most * (1.0 + SPEED_ROUNDING) + 1e-9
+            yield beyond, f"a {name} of {value:.5f} is above {most:.5f} (m, rad)", "set-point"
 
 
 def turn_between(first: np.ndarray, second: np.ndarray) -> float:
@@ -195,114 +195,107 @@ def turn_between(first: np.ndarray, second: np.ndarray) -> float:
     return float((turns[0].inv() * turns[1]).magnitude())
 
 
-def _check_numbers(path: PosePath, rate: float) -> None:
+def _refuse(refusals: Refusals) -> None:
+    for refused, what, where in refusals:
+        if refused:
+            raise MotionRejected(what, where=where, fix="correct the plan or the rig's limits")
+
+
+def _numbers(path: PosePath, rate: float) -> Refusals:
     time, pose = path.time, path.pose
-    if pose.ndim != 2 or pose.shape[1] != 6 or time.shape != pose.shape[:1] or len(time) < 2:
-        raise _rejected(f"times of shape {time.shape} and poses of shape {pose.shape}", "path")
-    if len(time) > MOST_SAMPLES:
-        raise _rejected(f"{len(time)} samples are more than {MOST_SAMPLES}", "path")
-    bad = ~np.isfinite(pose).all(axis=1)
-    if bad.any() or not np.isfinite(time).all():
-        k = int(bad.argmax())
-        raise _rejected(f"the pose {pose[k].tolist()} is not finite", f"path at sample {k}")
-    if np.abs(time - np.arange(len(time)) / rate).max() > 1e-6:
-        raise _rejected(f"its times are not those of a {rate:g} Hz clock from 0 s", "path")
+    shapes = f"times of shape {time.shape} and poses of shape {pose.shape}"
+    matching = pose.ndim == 2 and pose.shape[1] == 6 and time.shape == pose.shape[:1]
+    yield not matching or len(time) < 2, shapes, "path"
+    yield len(time) > MOST_SAMPLES, f"{len(time)} samples are more than {MOST_SAMPLES}", "path"
+    bad = ~(np.isfinite(pose).all(axis=1) & np.isfinite(time))
+    k = int(bad.argmax())
+    what = f"the pose {pose[k].tolist()} at {time[k]} s is not finite"
+    yield bool(bad.any()), what, f"path at sample {k}"
+    off = np.abs(time - np.arange(len(time)) / rate).max()
+    yield off > 1e-6, f"its times are not those of a {rate:g} Hz clock from 0 s", "path"
 
 
-def _check_rates(part: _Part, limits: Limits) -> None:
+def _rates(part: _Part, limits: Limits) -> Refusals:
     speed = np.linalg.norm(part.velocity, axis=1)
-    _bound(part.between, speed, limits.speed * (1.0 + SPEED_ROUNDING), "speed", "m/s")
+    yield _above(part.between, speed, limits.speed * (1.0 + SPEED_ROUNDING), "speed", "m/s")
     if len(part.velocity) > 1:
         dt = float(part.between[1] - part.between[0])
         change = np.linalg.norm(np.diff(part.velocity, axis=0), axis=1) / dt
         most = limits.acceleration * (1.0 + SPEED_ROUNDING)
-        _bound(part.between[:-1], change, most, "acceleration", "m/s2")
+        yield _above(part.between[:-1], change, most, "acceleration", "m/s2")
 
 
-def _check_turns(part: _Part, space: Workspace, limits: Limits) -> None:
+def _turns(part: _Part, space: Workspace, limits: Limits) -> Refusals:
     from scipy.spatial.transform import Rotation
 
     turns = Rotation.from_rotvec(part.pose[:, 3:])
     tilt = (Rotation.from_rotvec(space.orientation).inv() * turns).magnitude()
-    _bound(part.time, np.degrees(tilt), float(np.degrees(space.tilt)), "tilt", "deg")
+    yield _above(part.time, np.degrees(tilt), float(np.degrees(space.tilt)), "tilt", "deg")
     if len(part.time) > 1:
         rate = (turns[:-1].inv() * turns[1:]).magnitude() / np.diff(part.time)
         most = limits.tilt_rate_deg_s * (1.0 + SPEED_ROUNDING)
-        _bound(part.time[1:], np.degrees(rate), most, "tilt rate", "deg/s")
+        yield _above(part.time[1:], np.degrees(rate), most, "tilt rate", "deg/s")
 
 
-def _check_box(part: _Part, box: AxisLimits, limits: Limits) -> None:
-    speed = np.linalg.norm(np.diff(part.pose[:, :3], axis=0), axis=1) / _period(part.time)
+def _places(part: _Part, box: AxisLimits, limits: Limits) -> Refusals:
+    dt = float(part.time[1] - part.time[0]) if len(part.time) > 1 else 1.0
+    speed = np.linalg.norm(np.diff(part.pose[:, :3], axis=0), axis=1) / dt
     fastest = np.maximum(np.append(speed, 0.0), np.insert(speed, 0, 0.0))
     kept = np.asarray(margin(fastest, limits))
     for axis, name in enumerate("xyz"):
-        value = part.pose[:, axis]
-        low, high = box.low[axis] + kept, box.high[axis] - kept
+        value, low, high = part.pose[:, axis], box.low[axis] + kept, box.high[axis] - kept
         outside = (value < low - 1e-9) | (value > high + 1e-9)
-        if outside.any():
-            k = int(outside.argmax())
-            raise _rejected(
-                f"{name} = {value[k]:.4f} m is outside [{low[k]:.4f}, {high[k]:.4f}] m "
-                f"(the box less {1e3 * kept[k]:.1f} mm to stop)",
-                _when(part.time[k]),
-            )
+        k = int(outside.argmax())
+        what = f"{name} = {value[k]:.4f} m is outside [{low[k]:.4f}, {high[k]:.4f}] m"
+        what += f" (the box less {1e3 * kept[k]:.1f} mm to stop)"
+        yield bool(outside.any()), what, _when(part.time[k])
 
 
-def _check_tip(part: _Part, rig: Rig) -> None:
+def _tip(part: _Part, rig: Rig) -> Refusals:
     """The hanging stick must not meet the cup's wall; rig.toml keeps it off the floor."""
     x, y, z = part.pose[:, :3].T
     inside = z - rig.stick.length < rig.cup.height
     away = np.where(inside, np.hypot(x, y) + rig.stick.radius, 0.0)
     k = int(away.argmax())
-    if away[k] >= rig.cup.radius:
-        raise _rejected(
-            f"the stick is {away[k]:.4f} m from the cup's axis while its tip is in the cup "
-            f"(cup.radius = {rig.cup.radius} m)",
-            _when(part.time[k]),
-        )
-
-
-def _period(time: np.ndarray) -> float:
-    return float(time[1] - time[0]) if len(time) > 1 else 1.0
+    what = f"the stick is {away[k]:.4f} m from the cup's axis while its tip is in the cup"
+    what += f" (cup.radius = {rig.cup.radius} m)"
+    yield bool(away[k] >= rig.cup.radius), what, _when(part.time[k])
 
 
 def _first_joints(pose: np.ndarray, space: Workspace, joints: np.ndarray | None) -> np.ndarray:
     """Joints of a path's first pose: those that the arm has, where that is known."""
-    near = space.start if joints is None else np.asarray(joints)
-    if not np.isfinite(near).all():
-        raise _rejected(f"the arm's joints {near.tolist()} are not finite", _when(0.0))
+    near, start = space.start if joints is None else np.asarray(joints), _when(0.0)
+    finite = bool(np.isfinite(near).all())
+    _refuse([(not finite, f"the arm's joints {near.tolist()} are not finite", start)])
     first = inverse(space.arm, pose, near, tcp=space.tcp)
     if first is None:
-        raise _rejected("no joints reach its first pose", _when(0.0))
+        raise MotionRejected("no joints reach its first pose", where=start, fix="correct the plan")
     away = float(np.abs(first - near).max())
-    if joints is not None and not away <= JOINT_AGREEMENT:
-        raise _rejected(f"its first pose is {away:.2f} rad of a joint from the arm", _when(0.0))
+    elsewhere = joints is not None and not away <= JOINT_AGREEMENT
+    _refuse([(elsewhere, f"its first pose is {away:.2f} rad of a joint from the arm", start)])
     return first
 
 
-def _check_reach(part: _Part, space: Workspace, rig: Rig, joints: np.ndarray) -> np.ndarray:
+def _reached(part: _Part, space: Workspace, rig: Rig, joints: np.ndarray) -> np.ndarray:
     """Joints at the part's end, from those at the last sample before its new ones."""
     begin = max(part.new - 1, 0)
     poses, times = cup_frame(rig.cup).to_base(part.pose[begin:]), part.time[begin:]
     found = follow(space.arm, poses, joints, times=times, tcp=space.tcp)
-    if found.status != "ok":
-        raise _rejected(
-            f"joints: {found.status} (largest step {found.largest_step:.3f} rad, "
-            f"fastest {found.fastest:.2f} of a joint's limit)",
-            _when(times[found.at or 0]),
-        )
+    what = (
+        f"joints: {found.status} (largest step {found.largest_step:.3f} rad, fastest "
+        f"{found.fastest:.2f} of a joint's limit)"
+    )
+    _refuse([(found.status != "ok", what, _when(times[found.at or 0]))])
     return found.joints[-1]
 
 
-def _bound(time: np.ndarray, value: np.ndarray, most: float, name: str, unit: str) -> None:
+def _above(
+    time: np.ndarray, value: np.ndarray, most: float, name: str, unit: str
+) -> tuple[bool, str, str]:
     k = int(value.argmax())
-    if not value[k] <= most:
-        raise _rejected(f"{name} {value[k]:.4f} {unit} is above {most:.4f} {unit}", _when(time[k]))
+    what = f"{name} {value[k]:.4f} {unit} is above {most:.4f} {unit}"
+    return not value[k] <= most, what, _when(time[k])
 
 
 def _when(time: float) -> str:
     return f"path at {time:.3f} s"
-
-
-def _rejected(what: str, where: str) -> MotionRejected:
-    return MotionRejected(what, where=where, fix="correct the plan or the rig's limits")

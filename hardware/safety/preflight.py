@@ -1,4 +1,4 @@
-"""What must be true before an arm may move (S3), as a list that a person can read."""
+"""Conditions of a motion (S3), as a list that a person can read."""
 
 import shutil
 from collections.abc import Mapping
@@ -9,10 +9,10 @@ import numpy as np
 
 from ..arm import ArmState, Payload, Six
 from ..board import Row, Who
-from ..motion.cup_frame import cup_frame
 from ..motion.kinematics import forward
+from ..motion.poses import cup_frame
 from ..rig import Rig
-from .guards import CAMERAS, FULL_SPEED, PLAYING, RECORDER_AGE, RUNNING_MODE, safe, safety_text
+from .guards import CAMERAS, FULL_SPEED, RECORDER_AGE, RUNNING_MODE, safe, safety_text
 from .limits import Tool, turn_between, workspace
 
 # a real arm's calibrated kinematics differ from the published ones by up to some millimetres
@@ -36,7 +36,7 @@ class Check(NamedTuple):
 
 
 def arm_checks(states: list[ArmState], rig: Rig) -> list[Check]:
-    """What a look at the arm tells, armed or not.
+    """Checks by a look at the arm, armed or not.
 
     Args:
         states: Read one after the other for some tenths of a second, the arm at rest.
@@ -106,21 +106,6 @@ def place_check(state: ArmState, rig: Rig, tool: Tool) -> Check:
     inside = bool(((place >= space.box.low) & (place <= space.box.high)).all())
     text = f"the tool is at {np.round(place, 3).tolist()} m of the cup's frame"
     return Check("box", inside, text if inside else f"{text}; jog it into limits.{tool}")
-
-
-def program_check(state: ArmState) -> Check:
-    """Whether the controller's program runs, which follows the set-points."""
-    running = state.runtime_state == PLAYING
-    return Check("program", running, f"runtime_state = {state.runtime_state}")
-
-
-def limits_check(allowed: list[bool]) -> Check:
-    """Whether the controller's own safety limits allow some poses of the plan."""
-    return Check(
-        "controller's limits",
-        all(allowed),
-        f"{sum(allowed)} of {len(allowed)} poses of the plan are within them",
-    )
 
 
 def process_checks(rows: Mapping[Who, Row], rig: Rig, now: float) -> list[Check]:

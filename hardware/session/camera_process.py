@@ -14,19 +14,14 @@ import numpy as np
 from ..board import Board, Row, Trouble, Who, host_time
 from ..cameras.base import CameraError, FrameSource
 from ..csv_file import CsvAppender
-from ..priority import come_first
-from ..recorder.disk import Disk, told_if_fails
-from ..recorder.events import EventLog
-from ..recorder.names import frames_file, video_file
-from ..recorder.rate import Rate, counted, no_rate
-from ..recorder.stamps import stamp_fault
+from ..process import come_first, leave_signals_to_main
+from ..recorder.directory import frames_file, video_file
+from ..recorder.events import Disk, writing
 from ..recorder.video import VideoWriter
-from ..recorder.views import stick_view
 from ..rig import Rig, View
-from ..signals import leave_signals_to_main
-from ..vision.frame import Frame
-from ..vision.frame_measurement import Flag, FrameMeasurement, line_is_good
+from ..vision.frame import Flag, Frame, FrameMeasurement, line_is_good, stamp_fault
 from ..vision.measuring import FrameMeter
+from ..vision.stick_view import stick_view
 
 SAME_PICTURES = 3  # in a row; a camera's noise makes no two alike
 CLOSING_SECONDS = 0.3  # [s]; how long a camera that does not answer may hold up the end
@@ -64,7 +59,7 @@ def run_camera(
     """
     leave_signals_to_main()
     come_first()
-    with closing(EventLog(directory, f"camera_{view}")) as log, told_if_fails(disk := Disk(log)):
+    with writing(directory, f"camera_{view}") as disk:
         process = _CameraProcess(rig, view, board, disk, directory)
         leaving, answered = Event(), Event()
         Thread(target=_wait_for_end, args=(main, leaving, answered, process), daemon=True).start()
@@ -88,8 +83,8 @@ def _wait_for_end(
 class _Tally(NamedTuple):
     """Counts of the pictures so far."""
 
-    rate: Rate
     row: Row = Row()  # as it goes to the board; its beat is when the last new picture came
+    begun: float = 0.0  # when the first picture came [s]
     last: int = -1  # index of the last picture
     lost: int = 0
     same: int = 1  # times that the last picture has come in a row
@@ -97,17 +92,18 @@ class _Tally(NamedTuple):
 
 def tallied(tally: _Tally, seen: FrameMeasurement, now: float) -> _Tally:
     """Count another picture, which came at `now` [s]."""
-    before, rate = tally.row, counted(tally.rate, 1, now)
+    before, begun = tally.row, tally.begun or now
     row = before._replace(
-        count=rate.total,
-        rate=rate.rate,
+        count=before.count + 1,
+        rate=before.count / (now - begun) if now > begun else 0.0,
         value=seen.angle if line_is_good(seen.flags) else float("nan"),
     )
     same = tally.same + 1
     if not seen.flags & Flag.REPEATED_IMAGE:
         between = now - before.beat if before.beat else 0.0
         row, same = row._replace(beat=now, worst=max(before.worst, between)), 1
-    return _Tally(rate, row, seen.index, tally.lost + max(seen.index - tally.last - 1, 0), same)
+    lost = tally.lost + max(seen.index - tally.last - 1, 0)
+    return _Tally(row, begun, seen.index, lost, same)
 
 
 class _CameraProcess:
@@ -116,7 +112,7 @@ class _CameraProcess:
         self._board = board
         self._disk = disk
         self._trouble = Trouble.NONE
-        self._tally = _Tally(no_rate(host_time()))
+        self._tally = _Tally()
         self._stamps: tuple[float, float] | None = None  # the first and the latest [s]
         self._meter = FrameMeter(stick_view(rig, view))
         camera, table, video = rig.camera(view), frames_file(view), video_file(view)
@@ -154,7 +150,7 @@ class _CameraProcess:
     def tell_end(self, reason: str = "") -> None:
         """Write the last event."""
         tally = self._tally
-        self._disk.tell("left", frames=tally.rate.total, lost=tally.lost, reason=reason)
+        self._disk.tell("left", frames=int(tally.row.count), lost=tally.lost, reason=reason)
 
     def _take(self, frame: Frame, came: float) -> None:
         row = self._meter.measure(frame)

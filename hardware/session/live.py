@@ -1,4 +1,4 @@
-"""What an operator sees while the arm moves."""
+"""The operator's view while the arm moves."""
 
 from collections.abc import Mapping
 
@@ -9,7 +9,7 @@ from rich.text import Text
 
 from ..board import Row, Trouble, Who
 from ..safety.guards import OUTCOME_TROUBLE, Reading
-from .progress import Status
+from .processes import Status
 
 BAR_WIDTH = 30
 LITTLE_MARGIN = 0.2  # of a guard's limit: less margin is shown in yellow

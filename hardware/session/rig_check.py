@@ -1,19 +1,18 @@
-"""What of a rig works and what is missing, without moving anything."""
+"""Check of a rig: what works and what is missing; nothing moves."""
 
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from importlib.metadata import PackageNotFoundError, version
 
-from ..cameras import CameraError
+from ..cameras import CameraError, open_camera
 from ..errors import RigError
 from ..motion.stir_paths import insert, retract, stir
-from ..recorder.views import camera_model
 from ..rig import Camera, Rig
 from ..robot.ur import URReader
 from ..safety.limits import check_path
 from ..safety.preflight import Check, controller_checks, place_check
-from .cameras import open_camera
+from ..vision.stick_view import camera_model
 
 RTDE_PORT = 30004
 ANSWER_SECONDS = 2.0  # s

@@ -11,17 +11,15 @@ import numpy as np
 
 from ..board import Board, Who, check_can_start
 from ..errors import MotionRejected, RigError
-from ..motion.cup_frame import cup_frame
+from ..motion.poses import cup_frame
 from ..motion.stir_paths import PosePath
+from ..process import ignored_interrupts
 from ..recorder.directory import discard_directory, start_directory
-from ..recorder.events import EventLog, drop_reserve, read_events
-from ..recorder.outcome import detailed
+from ..recorder.events import EventLog, detailed, drop_reserve, read_events
 from ..robot.orders import Ask, Follow, Leave, Stop, Stopped
 from ..safety.limits import check_path
 from ..safety.preflight import Check, failures
-from ..signals import ignored_interrupts
-from .processes import Processes
-from .progress import Progress, SessionStopped, Status
+from .processes import Processes, Progress, SessionStopped, Status
 from .setup import SessionSetup
 
 END_SIGNALS = (signal.SIGTERM, signal.SIGHUP)  # Ctrl-C raises KeyboardInterrupt already
@@ -107,9 +105,9 @@ class Session:
         setup = self.setup
         setup.take_confirmation()
         extra = {"source": setup.source, "tool": setup.tool, "rehearsal": setup.rehearsal}
-        videos = bool(setup.make_cameras)
+        videos, lasts = bool(setup.make_cameras), sum(path.duration for path in setup.plan)
         # the rig itself, not the guards', whose limits a rehearsal widens
-        start_directory(self.directory, setup.rig, extra, duration=setup.duration, videos=videos)
+        start_directory(self.directory, setup.rig, extra, duration=lasts, videos=videos)
         log = EventLog(self.directory, "main")
         plan = "" if setup.confirmation is None else setup.confirmation.plan
         log.write("session", armed=setup.armed, address=setup.controller.address, plan=plan)
@@ -134,7 +132,7 @@ class Session:
         raise self._stop_error()
 
     def pose(self) -> np.ndarray:
-        """Where the tool was at the pre-flight: position in the cup's frame, shape (6,).
+        """Pose of the tool at the pre-flight: position in the cup's frame, shape (6,).
 
         Raises:
             RigError: The pre-flight list has failures.
@@ -168,16 +166,13 @@ class Session:
         assert progress.checked is not None
         joints = progress.checked.joints if progress.joints is None else progress.joints
         ended = check_path(path, self.rig, self.setup.tool, joints=joints)
-        self._order(path)
-        progress.joints = ended
-        progress.ordered += 1
-        return progress.ordered - 1
-
-    def _order(self, path: PosePath) -> None:
-        if self._progress.stopped is not None:
+        if progress.stopped is not None:
             raise self._stop_error()
         if self._processes is None or not self._processes.send(Follow(path)):
             raise SessionStopped("the control process is gone")
+        progress.joints = ended
+        progress.ordered += 1
+        return progress.ordered - 1
 
     def wait(self, number: int | None = None, timeout: float | None = None) -> bool:
         """Wait until a path is done, by default the latest; false if that lasts too long.
@@ -193,7 +188,7 @@ class Session:
         return len(progress.done) > last
 
     def status(self) -> Status:
-        """How it stands; asks the control process for fresh readings, for the next time."""
+        """State of the session; asks the control process for fresh readings, for the next time."""
         progress = self._progress
         if self._processes is not None and progress.stopped is None and not progress.closing:
             self._processes.send(Ask())

@@ -3,12 +3,14 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from .opencv import opencv
+from ..errors import missing_extra
 
 UNDISTORT_UNTIL = 20, 1e-9  # iterations, or an error of the picture [px]
 SHAPES = {
@@ -19,6 +21,23 @@ SHAPES = {
     "position": (3,),
     "distortion": (5,),
 }
+
+
+@cache
+def opencv() -> ModuleType:
+    """The module `cv2`, told to use one thread, as every camera has a process of its own.
+
+    Raises:
+        ImportError: OpenCV is not installed; the message names the extra that brings it.
+    """
+    try:
+        import cv2
+    except ModuleNotFoundError as err:
+        raise missing_extra("OpenCV", "cameras", "a camera") from err
+    cv2.setNumThreads(1)
+    # what it warns of, our own errors say with the camera's name
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
+    return cv2
 
 
 class CameraModelError(ValueError):
@@ -52,20 +71,23 @@ class CameraModel:
     distortion: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
+        faults: dict[str, bool] = {}
         for name, shape in SHAPES.items():
             value = np.array(getattr(self, name), dtype=float)
-            if value.shape != shape or not np.isfinite(value).all():
-                raise CameraModelError(
-                    f"the camera's {name} must be finite with shape {shape}, got {value.tolist()}"
-                )
+            wrong = value.shape != shape or not np.isfinite(value).all()
+            faults[f"{name} must be finite with shape {shape}, got {value.tolist()}"] = wrong
             if name in ("rotation", "position"):
                 value.setflags(write=False)
                 object.__setattr__(self, name, value)
-        if min(self.focal) <= 0 or min(self.size) <= 0:
-            raise CameraModelError(
-                f"focal length and image size must be positive, got {self.focal} and {self.size}"
-            )
-        _check_rotation(self.rotation)
+        sizes = f"focal length and size must be positive, got {self.focal} and {self.size}"
+        faults[sizes] = min(*self.focal, *self.size) <= 0
+        turn = self.rotation
+        no_turn = f"rotation must have right-handed unit vectors as rows, got {turn.tolist()}"
+        if turn.shape == (3, 3):
+            proper = np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) and np.linalg.det(turn) > 0
+            faults[no_turn] = not proper
+        for fault in (what for what, found in faults.items() if found):
+            raise CameraModelError(f"the camera's {fault}")
 
     def to_camera(self, points: np.ndarray) -> np.ndarray:
         """Points of the cup frame [m], shape (..., 3), in the camera frame."""
@@ -179,11 +201,3 @@ def read_camera(path: Path) -> CameraModel:
         raise CameraModelError(
             f"{path} describes no camera ({err}); calibrate this camera again"
         ) from err
-
-
-def _check_rotation(rotation: np.ndarray) -> None:
-    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6) or np.linalg.det(rotation) < 0:
-        raise CameraModelError(
-            f"the camera's rotation is no rotation matrix: {rotation.tolist()}; "
-            "its rows must be right-handed unit vectors"
-        )

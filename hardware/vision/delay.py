@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from ..motion.trajectory import Trajectory
+from ..motion.poses import Trajectory
 from .camera_model import CameraModel
 from .inclination import FrameSeries
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .camera_model import CameraModel
-from .frame_measurement import BAD_LINE, Flag
+from .frame import BAD_LINE, Flag
 
 LONGEST_GAP = 0.1  # s between the good frames on both sides
 NEIGHBOURS = 2  # on each side

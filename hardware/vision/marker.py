@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .opencv import opencv
+from .camera_model import opencv
 
 SEARCH_REDUCTION = 4  # the first search runs on a picture this much smaller
 CANDIDATES = 3

@@ -4,12 +4,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .coarse_search import Ray, Rows, sampled_rows, search_rays
-from .frame import Frame
-from .frame_measurement import Flag, FrameMeasurement, line_is_good
+from .frame import Flag, Frame, FrameMeasurement, line_is_good
 from .marker import Marker, find_marker
-from .stick_edges import Edges, find_edges
-from .stick_line import NO_LINE, Line, fit_line, moment_slope
+from .stick_line import (
+    NO_LINE,
+    Edges,
+    Line,
+    Ray,
+    Rows,
+    find_edges,
+    fit_line,
+    moment_slope,
+    sampled_rows,
+    search_rays,
+)
 from .stick_view import StickView
 
 LEAST_RESPONSE = 12.0  # grey levels
@@ -30,7 +38,7 @@ HIDDEN_SEARCH = 40.0  # px on both sides of where the marker was
 
 
 class Track(NamedTuple):
-    """What earlier frames tell about the next.
+    """Memory of earlier frames for the next.
 
     Attributes:
         pivot: Column and row [px], None before the first marker.
@@ -106,7 +114,7 @@ class FrameMeter:
 
 
 def _pivot(marker: Marker, view: StickView) -> tuple[float, float]:
-    """Where the pivot is in the picture; its depth is taken as that above the cup's middle."""
+    """Pivot in the picture [px]; its depth is taken as that above the cup's middle."""
     place = view.camera.place(np.array([marker.column, marker.row]), view.marker_depth)
     column, row = view.camera.project(place - np.array(view.scene.marker_offset))
     return float(column), float(row)
@@ -142,7 +150,7 @@ def _find_stick(
 
 
 def _rows(pivot: tuple[float, float], view: StickView) -> Rows:
-    """From below the gripper to above the liquid's surface."""
+    """Rows from below the gripper to above the liquid's surface."""
     hidden = view.scene.gripper_below * 1.3 * view.scale + 4.0
     first = max(int(np.ceil(pivot[1] + hidden)), 0)
     return Rows(first, min(int(view.last_row), view.camera.size[1]))

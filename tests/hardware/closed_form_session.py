@@ -1,10 +1,10 @@
 """The raw data of a session in which everything is as closed forms say."""
 
 import numpy as np
-from bolfi_liquids.hardware.recorder.sample import Sample
-from bolfi_liquids.hardware.recorder.views import camera_model
+from bolfi_liquids.hardware.recorder.samples import Sample
 from bolfi_liquids.hardware.rig_file import bundled_rig
-from bolfi_liquids.hardware.vision.frame_measurement import FrameMeasurement
+from bolfi_liquids.hardware.vision.frame import FrameMeasurement
+from bolfi_liquids.hardware.vision.stick_view import camera_model
 
 RIG = bundled_rig()
 WAY = 2.0  # s, down into the cup, and out of it

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.arm import Tool
 from bolfi_liquids.hardware.board import SPAWN, Board, Row, Who
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
 from bolfi_liquids.hardware.motion.kinematics import inverse
+from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.recorder.events import EventLog, read_events
 from bolfi_liquids.hardware.rig import Rig
-from bolfi_liquids.hardware.robot import control_loop, order_queue, ur
-from bolfi_liquids.hardware.robot.control_loop import ControlLoop, Links
-from bolfi_liquids.hardware.robot.control_process import checked
+from bolfi_liquids.hardware.robot import control_loop, queues, ur
+from bolfi_liquids.hardware.robot.control_loop import ControlLoop, Links, checked
 from bolfi_liquids.hardware.robot.orders import (
     Assignment,
     Began,
@@ -29,20 +28,10 @@ from bolfi_liquids.hardware.safety.limits import workspace
 
 sys.path.insert(0, str(Path(__file__).parent))
 from stepped_clock import SteppedClock  # noqa: E402
-from ur_controller.controller import Options  # noqa: E402
-from ur_controller.stepped import SteppedController, library  # noqa: E402
+from ur_controller.machine import Options  # noqa: E402
+from ur_controller.stepped import AtOnce, SteppedController, library  # noqa: E402
 
 LONGEST = 120.0  # s of the stepped clock, after which a test has failed
-
-
-class AtOnce:
-    """In place of the driver's thread, which has nothing to wait for here."""
-
-    def __init__(self, target: Callable[[], None], **_: object):
-        self.start = target
-
-    def join(self, _: float) -> None:
-        """Nothing is left to wait for."""
 
 
 class Orders:
@@ -170,17 +159,14 @@ class SteppedControl:
 @pytest.fixture
 def step_emulator(monkeypatch):
     """Makes a `SteppedController`, and ur_rtde's modules are its clients."""
-    running: list[SteppedController] = []
 
     def make(clock: SteppedClock, **options):
-        running.append(emulator := SteppedController(Options(**options), clock))
+        emulator = SteppedController(Options(**options), clock)
         for module in ("rtde_receive", "rtde_control"):
             monkeypatch.setitem(sys.modules, module, library(emulator))
         return emulator
 
-    yield make
-    for one in running:
-        one.close()
+    return make
 
 
 @pytest.fixture
@@ -195,7 +181,7 @@ def stepped_loop(monkeypatch):
     # the process of the tests keeps its priority
     monkeypatch.setattr(control_loop, "quieten", lambda: None)
     monkeypatch.setattr(control_loop, "hurry", lambda: "normal")
-    monkeypatch.setattr(order_queue, "hurry", lambda: "normal")
+    monkeypatch.setattr(queues, "hurry", lambda: "normal")
     running: list[SteppedControl] = []
 
     def make(to: Assignment, clock: SteppedClock, emulator: SteppedController | None = None):

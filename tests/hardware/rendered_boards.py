@@ -1,11 +1,9 @@
 """Synthetic pictures for calibration: a ChArUco board, and a plumb line."""
 
 import numpy as np
-from bolfi_liquids.hardware.rendering.coverage import bar_coverage, blend, window_around
-from bolfi_liquids.hardware.rendering.noise import noise_pool
-from bolfi_liquids.hardware.vision.camera_model import CameraModel
-from bolfi_liquids.hardware.vision.charuco import CharucoBoard
-from bolfi_liquids.hardware.vision.opencv import opencv
+from bolfi_liquids.hardware.rendering.drawing import bar_coverage, blend, noise_pool, window_around
+from bolfi_liquids.hardware.vision.calibration import CharucoBoard
+from bolfi_liquids.hardware.vision.camera_model import CameraModel, opencv
 
 SUPER_SAMPLING = 3
 SQUARE_PIXELS = 60

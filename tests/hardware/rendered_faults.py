@@ -6,8 +6,13 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 from bolfi_liquids.hardware.cameras import Frame, RenderedCamera
-from bolfi_liquids.hardware.rendering.coverage import PixelWindow, window_around
-from bolfi_liquids.hardware.rendering.drawing import Stage, develop, draw
+from bolfi_liquids.hardware.rendering.drawing import (
+    PixelWindow,
+    Stage,
+    develop,
+    draw,
+    window_around,
+)
 from bolfi_liquids.hardware.rendering.world import WorldState
 
 FRAMES_PER_FAULT = 3  # what gets in the way stays for a tenth of a second

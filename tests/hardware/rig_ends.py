@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any, get_args
 
-from bolfi_liquids.hardware.rig_numbers import RigSection, Within
+from bolfi_liquids.hardware.rig import RigSection, Within
 
 
 def numbers(section: RigSection, way: str = "") -> Iterator[tuple[str, float, Within | None]]:

@@ -7,15 +7,12 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.board import SPAWN
 from bolfi_liquids.hardware.rendering import (
-    Look,
     WorldState,
     exposure_times,
     prepare,
     render,
 )
 from bolfi_liquids.hardware.rendering.world import ROWS, SharedWorld
-from rendered_faults import fault_of, render_with
-from rendered_refraction import refracted
 from rendered_scenes import CLEAN, rehearsal_camera, rehearsal_scene
 
 pytest.importorskip("cv2")
@@ -38,7 +35,7 @@ def dark_centroids(image: np.ndarray, rows: range, background: float) -> np.ndar
     return weight @ np.arange(image.shape[1]) / weight.sum(axis=1)
 
 
-@pytest.mark.parametrize("angle_deg", [0.0, 0.4, 7.3, -21.0, 44.0])
+@pytest.mark.parametrize("angle_deg", [0.4, -21.0, 44.0])
 def test_the_stick_leans_as_much_as_it_should(angle_deg):
     # a camera that looks horizontally at the stick's plane shows angles in it as they are
     look = dataclasses.replace(CLEAN, background=200.0)
@@ -79,22 +76,6 @@ def test_a_lens_that_distorts_bends_the_stick():
     assert np.ptp(bent) > 0.5
 
 
-def test_the_submerged_part_looks_as_wide_and_as_far_aside_as_the_refractive_index():
-    # on the cup's axis plane a cylinder of liquid magnifies by its refractive index
-    pivot = (0.012, 0.0, 0.235)
-    look = dataclasses.replace(CLEAN, liquid=190.0, glass=190.0)
-    stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), look)
-    image = refracted(stage, state(0.0, pivot=pivot), RNG)
-    above, below = image[290].astype(float), image[390].astype(float)
-    shift = []
-    for line in (above, below):
-        weight = np.clip(185.0 - line, 0, None)
-        middle = weight @ np.arange(640) / weight.sum() - 319.5
-        shift.append((middle, (line < 150).sum()))
-    assert shift[1][0] / shift[0][0] == pytest.approx(1.33, rel=0.03)
-    assert shift[1][1] / shift[0][1] == pytest.approx(1.33, rel=0.12)
-
-
 def test_noise_has_the_strength_that_was_asked_for():
     look = dataclasses.replace(CLEAN, read_noise=2.0, shot_noise=0.05)
     clean, noisy = picture([state(0.0)]), picture([state(0.0)], look)
@@ -103,34 +84,9 @@ def test_noise_has_the_strength_that_was_asked_for():
     assert abs(difference.mean()) < 0.1
 
 
-def test_faults_are_as_frequent_as_asked_and_repeat_with_the_seed():
-    stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), Look())
-    drawn = [fault_of(k, 0.1, stage, 3) for k in range(9000)]
-    share = np.mean([fault is not None for fault in drawn])
-    # 3000 independent draws of three frames each
-    assert share == pytest.approx(0.1, abs=4 * np.sqrt(0.09 / 3000))
-    assert {fault.kind for fault in drawn if fault} == {"hand", "hose", "glare"}
-    assert fault_of(77, 1.0, stage, 3) == fault_of(77, 1.0, stage, 3)
-
-
-@pytest.mark.parametrize("kind", ["hand", "hose", "glare"])
-def test_each_fault_changes_the_picture_near_its_place(kind):
-    stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), CLEAN)
-    faults = (fault_of(k, 1.0, stage, 0) for k in range(300))
-    fault = next(fault for fault in faults if fault is not None and fault.kind == kind)
-    clean = render(stage, [state(3.0)], RNG)
-    wrong = render_with(fault, stage, [state(3.0)], RNG)
-    column, row = (int(value) for value in fault.place)
-    near = np.s_[max(row - 5, 0) : row + 6, max(column - 5, 0) : column + 6]
-    assert np.abs(wrong[near].astype(int) - clean[near]).max() > 10
-
-
-def test_exposure_times_surround_the_middle():
+def test_exposures_surround_their_middle_and_a_gripper_out_of_view_leaves_the_backdrop():
     times = exposure_times(5.0, dataclasses.replace(CLEAN, exposure=0.009))
     np.testing.assert_allclose(times, [4.997, 5.0, 5.003])
-
-
-def test_a_gripper_out_of_view_leaves_the_backdrop():
     stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), CLEAN)
     away = state(0.0, pivot=(0.0, -2.0, 0.3))
     np.testing.assert_array_equal(render(stage, [away], RNG)[:100], stage.backdrop[:100])
@@ -175,7 +131,7 @@ def test_whoever_looks_from_another_process_sees_whole_states_only():
     writer.start()
     end, times = time.monotonic() + 60.0, set()
     try:
-        while len(times) < 500 and time.monotonic() < end:
+        while len(times) < 200 and time.monotonic() < end:
             seen = world.state(np.inf)
             # all numbers of a state are the same here
             assert (seen.pivot == seen.time).all() and (seen.inclination == seen.time).all()
@@ -183,4 +139,4 @@ def test_whoever_looks_from_another_process_sees_whole_states_only():
     finally:
         enough.set()
         writer.join()
-    assert len(times) == 500
+    assert len(times) == 200

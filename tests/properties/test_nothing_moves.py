@@ -19,7 +19,7 @@ import pexpect
 import pytest
 import typer.main
 from bolfi_liquids.hardware.emulated.arm import EmulatedController
-from bolfi_liquids.hardware.session.confirmation import CONFIRMATION, Confirmation
+from bolfi_liquids.hardware.session.setup import CONFIRMATION, Confirmation
 from pexpect.fdpexpect import fdspawn
 
 import bolfi_liquids as bl
@@ -179,8 +179,8 @@ def test_one_file_knows_the_library_that_moves_arms():
     assert sources(r"\bURArm\(") == {"hardware/robot/ur.py"}
     armed = {name for name, path in SOURCES.items() if gives("armed", path)}
     # the others hand it on
-    control = {f"hardware/robot/control_{name}.py" for name in ("loop", "process")}
-    inside = {"hardware/session/session.py", "hardware/session/setup.py", *control}
+    session = {f"hardware/session/{name}.py" for name in ("session", "setup")}
+    inside = {"hardware/robot/control_loop.py", *session}
     assert armed == {"bolfi_liquids/robot/armed_session.py", *inside}
 
 

@@ -73,7 +73,7 @@ def test_inclination_is_what_was_drawn(directory, recorded, view):
 @pytest.mark.slow
 @pytest.mark.parametrize("view", VIEWS)
 def test_no_gross_error_of_a_picture_goes_unflagged(directory, recorded, view):
-    from bolfi_liquids.hardware.vision.frame_measurement import FrameMeasurement, line_is_good
+    from bolfi_liquids.hardware.vision.frame import FrameMeasurement, line_is_good
 
     drawn = read_csv(directory / f"truth_{view}.csv", TRUTH)
     seen = read_csv(directory / f"frames_{view}.csv", FrameMeasurement._fields)

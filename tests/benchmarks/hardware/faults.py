@@ -25,14 +25,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bolfi_liquids.hardware.motion.stir_paths import stir
-from bolfi_liquids.hardware.recorder.events import read_events
-from bolfi_liquids.hardware.recorder.outcome import outcome
-from bolfi_liquids.hardware.recorder.sample import SAMPLES
+from bolfi_liquids.hardware.recorder.events import outcome, read_events
+from bolfi_liquids.hardware.recorder.samples import SAMPLES
 from faulty_session import small_rig
 
 sys.path.append(str(Path(__file__).parents[2] / "hardware"))
-from ur_controller.admin_client import Admin  # noqa: E402
-from ur_controller.process import ControllerProcess  # noqa: E402
+from ur_controller.process import (
+    Admin,  # noqa: E402
+    ControllerProcess,  # noqa: E402
+)
 
 WATCHED = 2.0  # s after a fault, in which nothing may restart
 LOST = 1.0  # s of the recording before a fault that may be missing
@@ -144,7 +145,7 @@ class Watcher:
     def _follow(self) -> None:
         try:
             for state in self._states:
-                (self.resting if state.at_rest else self.moving).append(state.host)
+                (self.resting if state.resting else self.moving).append(state.host)
         except OSError:
             return  # the emulator has ended
 

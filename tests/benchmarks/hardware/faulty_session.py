@@ -16,14 +16,13 @@ from typing import NamedTuple
 import numpy as np
 from bolfi_liquids.hardware.cameras.base import Frame
 from bolfi_liquids.hardware.motion.stir_paths import PosePath, stir
-from bolfi_liquids.hardware.recorder.sample import SAMPLES
+from bolfi_liquids.hardware.recorder.samples import SAMPLES
 from bolfi_liquids.hardware.rig import Rig
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.robot.orders import Follow
 from bolfi_liquids.hardware.robot.ur import URController
-from bolfi_liquids.hardware.session.confirmation import CONFIRMATION, confirm, describe
 from bolfi_liquids.hardware.session.session import Session, SessionStopped
-from bolfi_liquids.hardware.session.setup import SessionSetup
+from bolfi_liquids.hardware.session.setup import CONFIRMATION, SessionSetup, confirm, describe
 
 IMAGE_SIZE = (160, 120)  # px
 FOCAL_LENGTH = 200.0  # px; they show what larger ones do

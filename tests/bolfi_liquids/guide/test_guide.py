@@ -152,8 +152,8 @@ def test_rig_toml_is_told_field_by_field_with_both_ends():
 
 
 def test_columns_of_a_session_are_told():
-    from bolfi_liquids.hardware.recorder.sample import Sample
-    from bolfi_liquids.hardware.vision.frame_measurement import Flag, FrameMeasurement
+    from bolfi_liquids.hardware.recorder.samples import Sample
+    from bolfi_liquids.hardware.vision.frame import Flag, FrameMeasurement
 
     page = read_page("files")
     arm, pictures = page.split("\n`samples.csv`:\n", 1)[1].split("\n`frames_xz.csv` and", 1)

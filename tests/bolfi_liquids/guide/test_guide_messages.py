@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-from bolfi_liquids.hardware.vision.opencv import opencv
+from bolfi_liquids.hardware.vision.camera_model import opencv
 from typer.testing import CliRunner
 
 from bolfi_liquids.cli.app import app

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware.recorder.views import camera_model
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.vision import CharucoBoard
+from bolfi_liquids.hardware.vision.stick_view import camera_model
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 

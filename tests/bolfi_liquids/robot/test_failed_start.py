@@ -2,8 +2,8 @@
 
 import pytest
 from bolfi_liquids.hardware.recorder.events import EventLog
-from bolfi_liquids.hardware.session.confirmation import CONFIRMATION
 from bolfi_liquids.hardware.session.session import Session
+from bolfi_liquids.hardware.session.setup import CONFIRMATION
 
 from bolfi_liquids import hardware
 from bolfi_liquids.robot.armed_session import Task, armed_session

@@ -17,18 +17,19 @@ from bolfi_liquids.hardware.cameras.files import FilesCamera  # noqa: E402
 from bolfi_liquids.hardware.cameras.rendered import RenderedCamera, Timing  # noqa: E402
 from bolfi_liquids.hardware.csv_file import read_csv  # noqa: E402
 from bolfi_liquids.hardware.recorder.events import read_events  # noqa: E402
-from bolfi_liquids.hardware.recorder.rate import no_rate  # noqa: E402
 from bolfi_liquids.hardware.recorder.video import VideoWriter  # noqa: E402
-from bolfi_liquids.hardware.recorder.views import camera_model, stick_view  # noqa: E402
 from bolfi_liquids.hardware.rendering import Look, Scene  # noqa: E402
 from bolfi_liquids.hardware.rendering.drawing import prepare, render  # noqa: E402
 from bolfi_liquids.hardware.rendering.world import WorldState  # noqa: E402
 from bolfi_liquids.hardware.rig_file import bundled_rig  # noqa: E402
 from bolfi_liquids.hardware.session.camera_process import _Tally as Tally  # noqa: E402
 from bolfi_liquids.hardware.session.camera_process import run_camera, tallied  # noqa: E402
-from bolfi_liquids.hardware.vision.frame import Frame  # noqa: E402
-from bolfi_liquids.hardware.vision.frame_measurement import FrameMeasurement  # noqa: E402
+from bolfi_liquids.hardware.vision.frame import (
+    Frame,  # noqa: E402
+    FrameMeasurement,
+)
 from bolfi_liquids.hardware.vision.measuring import FrameMeter  # noqa: E402
+from bolfi_liquids.hardware.vision.stick_view import camera_model, stick_view
 from rendered_scenes import CLEAN, MovingWorld  # noqa: E402
 
 # pictures come at 30 Hz, and none may be missed; the others keep no time
@@ -94,8 +95,8 @@ class Running:
 def start(tmp_path):
     running = []
 
-    def start(make_camera):
-        running.append(Running(tmp_path, make_camera))
+    def start(make_camera, directory=tmp_path):
+        running.append(Running(directory, make_camera))
         return running[-1]
 
     yield start
@@ -126,16 +127,15 @@ def test_rows_and_pictures_agree_and_main_s_end_ends_the_process(start, tmp_path
     running = start(rendered())
     running.wait(lambda row: row.count >= 30)
     os.kill(running.process.pid, signal.SIGINT)  # as Ctrl-C sends it to all
-    # long enough that the frames lost while the process starts hardly count in the rate
-    row = running.wait(lambda row: row.count >= 90)
+    row = running.wait(lambda row: row.count >= 60)
     assert row.trouble == Trouble.NONE
-    assert row.rate == pytest.approx(30.0, abs=3.0)
     assert abs(row.value) < 0.11
     assert running.end() < 0.5
     assert running.process.exitcode == 0
     table, video = frames(tmp_path), pictures(tmp_path)
-    assert len(video) == len(table["index"]) >= 90
+    assert len(video) == len(table["index"]) >= 60
     taken = table["stamp"] - table["stamp"][0]
+    assert row.rate == pytest.approx((row.count - 1) / taken[int(row.count) - 1], rel=0.05)
     np.testing.assert_allclose([frame.stamp for frame in video], taken, atol=1.1e-3)
     angle = swing(table["stamp"] - Timing().latency)[1][:, 0]
     good = table["flags"] == 0
@@ -192,23 +192,17 @@ def test_the_line_is_where_it_was_in_the_recorded_video(tmp_path):
 
 
 def test_a_video_has_the_times_of_its_pictures(tmp_path):
-    stamps = [100.0, 100.0334, 100.2, 100.2, 100.1, 101.5]
+    stamps = [np.nan, 100.0, 100.0334, 100.2, 100.2, np.inf, 100.1, 101.5]  # each costs no video
     video = VideoWriter(tmp_path / "xz.mkv", size=(642, 482), rate=30.0)
     for k, stamp in enumerate(stamps):
-        video.write(np.full((482, 642), 40 * k, np.uint8), stamp)
+        video.write(np.full((482, 642), 30 * k, np.uint8), stamp)
     with pytest.raises(ValueError, match=r"\(480, 640\).*\(482, 642\)"):
         video.write(np.zeros((480, 640), np.uint8), 102.0)
     video.close()
     video.close()
     seen = pictures(tmp_path)
-    assert [round(1e3 * frame.stamp) for frame in seen] == [0, 33, 200, 201, 202, 1500]
-    assert [int(np.median(frame.image)) for frame in seen] == [0, 40, 80, 120, 160, 200]
-
-
-def test_a_missing_encoder_names_its_extra(tmp_path, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "av", None)
-    with pytest.raises(ImportError, match=r"bolfi-liquids\[cameras\]"):
-        VideoWriter(tmp_path / "xz.mkv", size=(640, 480), rate=30.0)
+    assert [round(1e3 * frame.stamp) for frame in seen] == [0, 1, 33, 200, 201, 202, 203, 1500]
+    assert [int(np.median(frame.image)) for frame in seen] == [30 * k for k in range(8)]
 
 
 @keeps_time
@@ -261,36 +255,27 @@ def test_a_clock_that_stands_still_after_the_start_is_told(start, tmp_path):
     assert "stand still" in told["reason"] and f"frame {told['index']}" in told["reason"]
 
 
-def test_a_camera_that_ends_or_cannot_be_opened_is_told(start, tmp_path):
-    video = VideoWriter(tmp_path / "source.mkv", size=(640, 480), rate=30.0)
-    for k in range(10):
-        video.write(np.full((480, 640), 20 * k, np.uint8), k / 30)
-    video.close()
-    running = start(partial(FilesCamera, tmp_path / "source.mkv"))
-    row = running.wait(lambda row: row.trouble)
-    assert row.trouble == Trouble.SOURCE_LOST
-    running.end()
-    lost, left = read_events(tmp_path)
-    assert (lost["kind"], left["frames"]) == ("source_lost", 10)
-    assert len(pictures(tmp_path)) == 10
-
-
-def test_a_camera_that_is_not_there_is_told(start, tmp_path):
-    running = start(partial(FilesCamera, tmp_path / "nothing.mkv"))
-    row = running.wait(lambda row: row.trouble)
-    assert (row.trouble, row.beat) == (Trouble.SOURCE_LOST, 0.0)
-    running.end()
-    assert "nothing.mkv" in read_events(tmp_path)[0]["reason"]
-
-
-def test_pictures_of_another_size_are_told(start, tmp_path):
-    video = VideoWriter(tmp_path / "source.mkv", size=(320, 240), rate=30.0)
-    video.write(np.zeros((240, 320), np.uint8), 0.0)
-    video.close()
-    running = start(partial(FilesCamera, tmp_path / "source.mkv"))
-    running.wait(lambda row: row.trouble == Trouble.SOURCE_LOST)
-    running.end()
-    assert "(240, 320)" in read_events(tmp_path)[0]["reason"]
+def test_a_camera_that_ends_or_cannot_be_used_is_told(start, tmp_path):
+    for name, size, frames_kept, told in (
+        ("source.mkv", (640, 480), 10, "no more"),
+        ("small.mkv", (320, 240), 0, "(240, 320)"),
+        ("nothing.mkv", None, 0, "nothing.mkv"),
+    ):
+        if size is not None:
+            video = VideoWriter(tmp_path / name, size=size, rate=30.0)
+            for k in range(10):
+                video.write(np.full(size[::-1], 20 * k, np.uint8), k / 30)
+            video.close()
+        folder = tmp_path / name.partition(".")[0]
+        folder.mkdir()
+        running = start(partial(FilesCamera, tmp_path / name), folder)
+        row = running.wait(lambda row: row.trouble)
+        assert (row.trouble, row.count) == (Trouble.SOURCE_LOST, frames_kept)
+        running.end()
+        lost, left = read_events(folder)
+        assert (lost["kind"], left["frames"]) == ("source_lost", frames_kept)
+        assert told in lost["reason"]
+        assert len(frames(folder)["index"]) == frames_kept
 
 
 @keeps_time
@@ -319,41 +304,28 @@ def write_that_failed(running, directory):
     return failed
 
 
-@pytest.mark.parametrize("file", ["frames_xz.csv", "xz.mkv"])
-def test_a_file_that_may_not_grow_is_told_and_the_camera_goes_on(start, tmp_path, file):
+def test_a_file_that_may_not_grow_is_told_and_the_camera_goes_on(start, tmp_path):
     running = start(rendered())
     running.wait(lambda row: row.count >= 10)
-    size = (tmp_path / file).stat().st_size + 50
+    size = (tmp_path / "frames_xz.csv").stat().st_size + 50
     # the table's limit stops the video too, whichever of them is written first
     resource.prlimit(running.process.pid, resource.RLIMIT_FSIZE, (size, size))
-    failed = write_that_failed(running, tmp_path)
-    assert failed["file"] in ("frames_xz.csv", "xz.mkv")
+    assert write_that_failed(running, tmp_path)["file"] in ("frames_xz.csv", "xz.mkv")
     assert len(frames(tmp_path)["index"]) >= 10
 
 
-@pytest.mark.parametrize("file", ["frames_xz.csv", "xz.mkv"])
-def test_a_full_disk_is_told_and_the_camera_goes_on(start, tmp_path, file):
-    (tmp_path / file).symlink_to("/dev/full")  # each write fails as on a full disk (ENOSPC)
-    running = start(rendered())
-    failed = write_that_failed(running, tmp_path)
-    assert failed["reason"] == f"{file}: No space left on device (make room)"
-
-
-def test_a_stamp_that_is_no_number_costs_no_video(tmp_path):
-    stamps = [np.nan, 5.0, 5.1, np.inf, 5.2]
-    video = VideoWriter(tmp_path / "xz.mkv", size=(640, 480), rate=30.0)
-    for k, stamp in enumerate(stamps):
-        video.write(np.full((480, 640), 40 * k, np.uint8), stamp)
-    video.close()
-    assert len(pictures(tmp_path)) == len(stamps)
+def test_a_full_disk_is_told_and_the_camera_goes_on(start, tmp_path):
+    (tmp_path / "xz.mkv").symlink_to("/dev/full")  # each write fails as on a full disk (ENOSPC)
+    failed = write_that_failed(start(rendered()), tmp_path)
+    assert failed["file"] == "xz.mkv" and "make room" in failed["reason"]
 
 
 def test_lost_and_repeated_pictures_are_counted():
-    tally, meter = Tally(no_rate(0.0)), FrameMeter(stick_view(RIG, "xz"))
+    tally, meter = Tally(), FrameMeter(stick_view(RIG, "xz"))
     for k, index in enumerate([0, 1, 2, 5, 6, 10]):
         image = np.full((480, 640), min(k, 3), np.uint8)
         tally = tallied(tally, meter.measure(Frame(index, k / 30, image)), 1.0 + k / 30)
-    assert (tally.rate.total, tally.lost, tally.same) == (6, 5, 3)
+    assert (tally.row.count, tally.lost, tally.same) == (6, 5, 3)
     assert tally.row.beat == pytest.approx(1.1)
     assert tally.row.worst == pytest.approx(1 / 30)
 

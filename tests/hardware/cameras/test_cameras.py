@@ -2,8 +2,6 @@
 
 import csv
 import dataclasses
-import sys
-import time
 
 import numpy as np
 import pytest
@@ -15,7 +13,7 @@ from bolfi_liquids.hardware.cameras import (
     Webcam,
 )
 from bolfi_liquids.hardware.cameras.base import grey
-from bolfi_liquids.hardware.rendering import Look, prepare
+from bolfi_liquids.hardware.rendering import prepare
 from rendered_scenes import CLEAN, MovingWorld, rehearsal_camera, rehearsal_scene
 from stepped_clock import SteppedClock
 
@@ -37,117 +35,64 @@ def video(tmp_path):
     return path
 
 
-def test_a_directory_of_pictures_is_read_in_order_and_unchanged(tmp_path):
-    images = pictures(12)
-    for k, image in enumerate(images):
-        cv2.imwrite(str(tmp_path / f"{k:04d}.png"), image)
-    (tmp_path / "notes.txt").write_text("no picture")
-    camera = FilesCamera(tmp_path, rate=20.0)
-    for k, image in enumerate(images):
-        frame = camera.read()
-        assert frame is not None
-        assert (frame.index, frame.stamp) == (k, pytest.approx(k / 20.0))
-        np.testing.assert_array_equal(frame.image, image)
-    assert camera.read() is None
-    assert camera.read() is None
-
-
 @pytest.mark.parametrize(
     "names",
     [
-        [f"{k}.png" for k in range(1, 13)],
+        [f"{k:04d}.png" for k in range(12)],
         [f"Frame {k}.PNG" if k % 2 else f"frame {k}.png" for k in range(8, 12)],
         ["b2_9.png", "b2_10.png", "b10_1.png"],
-        ["1.png", "01.jpg", "2.png"][1:],
     ],
 )
-def test_numbers_in_names_count_as_numbers(tmp_path, names):
-    for level, name in enumerate(names):
-        cv2.imwrite(str(tmp_path / name), np.full((48, 64), 10 * level + 20, np.uint8))
-    camera = FilesCamera(tmp_path)
-    levels = [frame.image.mean() for frame in iter(camera.read, None)]
-    np.testing.assert_allclose(levels, 10.0 * np.arange(len(names)) + 20.0, atol=1.0)
-
-
-def test_hidden_files_are_no_pictures(tmp_path):
-    cv2.imwrite(str(tmp_path / "1.png"), np.zeros((48, 64), np.uint8))
-    for name in ("._1.png", ".DS_Store", "Thumbs.db", ".2.png"):
-        (tmp_path / name).write_bytes(b"a note of the system")
-    assert len(list(iter(FilesCamera(tmp_path).read, None))) == 1
-    (tmp_path / "1.png").unlink()
-    with pytest.raises(CameraError, match="no pictures"):
-        FilesCamera(tmp_path)
-
-
-def test_a_video_has_its_own_times_and_becomes_grey(video):
-    camera, frames = FilesCamera(video), []
-    while (frame := camera.read()) is not None:
-        frames.append(frame)
-    camera.close()
-    assert len(frames) == 20
-    np.testing.assert_allclose([f.stamp for f in frames], np.arange(20) / 25.0, atol=1e-6)
-    assert frames[7].image.shape == (48, 64)
-    assert frames[7].image.mean() == pytest.approx(70.0, abs=2.0)
-
-
-def test_nothing_to_read_is_refused_on_opening(tmp_path):
-    with pytest.raises(CameraError, match="no pictures"):
-        FilesCamera(tmp_path)
-    with pytest.raises(CameraError, match="nowhere"):
-        FilesCamera(tmp_path / "nowhere")
-    (tmp_path / "broken.png").write_bytes(b"no picture")
-    with pytest.raises(CameraError, match=r"broken\.png"):
-        FilesCamera(tmp_path)
-    with pytest.raises(ValueError, match="rate"):
-        FilesCamera(tmp_path, rate=0.0)
-
-
-def test_closing_ends_the_frames(video):
-    camera = FilesCamera(video)
-    camera.close()
-    camera.close()
+def test_pictures_are_read_unchanged_in_the_order_of_the_numbers_in_their_names(tmp_path, names):
+    images = pictures(len(names))
+    for name, image in zip(names, images, strict=True):
+        cv2.imwrite(str(tmp_path / name), image)
+    # a hidden file is a note of the system about another
+    for name in ("notes.txt", "._1.png", ".DS_Store"):
+        (tmp_path / name).write_bytes(b"no picture")
+    camera = FilesCamera(tmp_path, rate=20.0)
+    for k, (frame, image) in enumerate(zip(iter(camera.read, None), images, strict=True)):
+        assert (frame.index, frame.stamp) == (k, pytest.approx(k / 20.0))
+        np.testing.assert_array_equal(frame.image, image)
     assert camera.read() is None
 
 
-def test_grey_is_the_usual_mixture():
+def test_a_video_has_its_own_times_and_becomes_grey(video):
+    frames = list(iter(FilesCamera(video).read, None))
+    assert len(frames) == 20
+    np.testing.assert_allclose([f.stamp for f in frames], np.arange(20) / 25.0, atol=1e-6)
+    assert frames[7].image.mean() == pytest.approx(70.0, abs=2.0)
     colour = np.zeros((1, 3, 3), np.uint8)
     colour[0, [0, 1, 2], [0, 1, 2]] = 200  # blue, green, red
     np.testing.assert_allclose(grey(colour)[0], [22.8, 117.4, 59.8], atol=0.6)
 
 
-def test_a_webcam_delivers_frames_and_says_when_it_stops(video):
+def test_nothing_to_read_is_refused_on_opening(tmp_path):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "one.png").write_bytes(b"no picture")
+    for name in ("empty", "nowhere", "broken"):
+        with pytest.raises(CameraError, match=name):
+            FilesCamera(tmp_path / name)
+    with pytest.raises(ValueError, match="rate"):
+        FilesCamera(tmp_path, rate=0.0)
+
+
+def test_a_webcam_skips_what_was_kept_and_says_when_it_stops(video):
     # OpenCV opens a file like a device: this tries all but the driver's settings
     camera = Webcam(str(video), size=(64, 48))
-    first = camera.read()
-    second = camera.read()
-    assert first is not None and second is not None
+    first, second = camera.read(), camera.read()
     assert (first.index, second.index) == (5, 11)  # a file's pictures are all there at once
-    assert first.image.shape == (48, 64)
-    assert first.stamp < second.stamp <= time.monotonic()
-    with pytest.raises(CameraError, match=r"view\.avi.*no picture after frame 15"):
+    with pytest.raises(CameraError, match=r"view\.avi"):
         for _ in range(100):
             camera.read()
     camera.close()
 
 
-def test_a_webcam_of_another_size_is_refused(video):
-    with pytest.raises(CameraError, match=r"view\.avi.*64x48 instead of 640x480"):
-        Webcam(str(video), size=(640, 480))
-
-
-def test_without_opencv_the_extra_is_named(monkeypatch):
-    from bolfi_liquids.hardware.vision.opencv import opencv
-
-    monkeypatch.setitem(sys.modules, "cv2", None)
-    opencv.cache_clear()
-    with pytest.raises(ImportError, match=r"bolfi-liquids\[cameras\]"):
-        Webcam(0, size=(64, 48))
-    opencv.cache_clear()
-
-
-def test_a_webcam_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(CameraError, match="no_camera"):
-        Webcam(str(tmp_path / "no_camera"), size=(64, 48))
+def test_a_webcam_of_another_size_and_one_that_is_not_there_are_named(video, tmp_path):
+    for path, size in ((video, (640, 480)), (tmp_path / "no_camera", (64, 48))):
+        with pytest.raises(CameraError, match=path.name):
+            Webcam(str(path), size=size)
 
 
 class Capture:
@@ -255,12 +200,3 @@ def test_a_late_frame_shows_its_own_moment_and_only_old_ones_are_lost():
     clock.sleep(1.0)
     assert camera.read().index > 20
     assert clock.now() - world.times[-1] <= 0.2 + 1e-9
-
-
-def test_a_rendered_picture_is_what_a_camera_of_this_project_gives():
-    clock = SteppedClock(50.0)
-    stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), Look())
-    camera = RenderedCamera(stage, Asked(0.0), clock=clock)
-    frame = camera.read()
-    assert frame is not None
-    assert (frame.image.dtype, frame.image.shape) == (np.uint8, (480, 640))

@@ -6,8 +6,9 @@ from bolfi_liquids.hardware import HiddenLiquid, StickMotion, bundled_rig, emula
 from bolfi_liquids.hardware.arm import LinkLost
 from bolfi_liquids.hardware.emulated.arm import FORCE_NOISE, MAX_LATENESS
 from bolfi_liquids.hardware.errors import RigError
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
-from bolfi_liquids.hardware.motion.stir_paths import stir
+from bolfi_liquids.hardware.motion.poses import cup_frame
+from bolfi_liquids.hardware.motion.pour_paths import ready_to_pour
+from bolfi_liquids.hardware.motion.stir_paths import stir, strokes
 from bolfi_liquids.hardware.robot.ur import STOP_DECELERATION
 from bolfi_liquids.hardware.safety.guards import PLAYING
 from stepped_clock import SteppedClock
@@ -21,10 +22,10 @@ PERIOD = 1.0 / RIG.robot.rate
 SOON = int(np.flatnonzero(np.linalg.norm(PATH[:, :3] - PATH[0, :3], axis=1) > 0.02)[0])
 
 
-def opened(controller):
+def opened(controller, rig=TURNED):
     """Its arm under control, and the clock by which that moves."""
     clock = SteppedClock(controller.begun)
-    arm = controller._replace(clock=clock).follower(TURNED, "stirring")
+    arm = controller._replace(clock=clock).follower(rig, "stirring")
     arm.connect()
     arm.take_control()
     return arm, clock
@@ -89,7 +90,7 @@ def test_the_force_is_noise_of_its_seed():
     def readings(seed):
         controller = emulated(TURNED, STIR.pose[0], liquid=HiddenLiquid(seed=seed)).controller
         (arm, clock), found = opened(controller), []
-        for _ in range(2000):
+        for _ in range(1000):
             clock.sleep(PERIOD)
             found.append(arm.read().wrench)
         return np.array(found)
@@ -97,9 +98,9 @@ def test_the_force_is_noise_of_its_seed():
     one, same, other = readings(1), readings(1), readings(2)
     np.testing.assert_array_equal(one, same)
     assert (one != other).all()
-    # standard errors of a mean and of a standard deviation of 2000, five times
-    assert np.abs(one.mean(axis=0) / FORCE_NOISE).max() < 5 / np.sqrt(2000)
-    assert one.std(axis=0) / FORCE_NOISE == pytest.approx(np.ones(6), abs=5 / np.sqrt(4000))
+    # standard errors of a mean and of a standard deviation of 1000, five times
+    assert np.abs(one.mean(axis=0) / FORCE_NOISE).max() < 5 / np.sqrt(1000)
+    assert one.std(axis=0) / FORCE_NOISE == pytest.approx(np.ones(6), abs=5 / np.sqrt(2000))
 
 
 def test_cameras_see_where_the_stick_is_and_how_it_hangs():
@@ -115,22 +116,34 @@ def test_cameras_see_where_the_stick_is_and_how_it_hangs():
     # at the end of the path, where the table ends
     assert seen.inclination == pytest.approx(lean[-1], abs=2e-3)
 
-
-def test_a_stick_of_which_nothing_is_known_hangs_straight_down():
-    rig = emulated(TURNED, STIR.pose[0])
-    arm, clock = opened(rig.controller)
+    # a stick of which nothing is known hangs straight down
+    plain = emulated(TURNED, STIR.pose[0])
+    arm, clock = opened(plain.controller)
     follow(arm, clock, PATH[:SOON])
-    seen = rig.controller.world.state(clock.now())
+    seen = plain.controller.world.state(clock.now())
     assert (seen.inclination == 0.0).all() and seen.pivot[0] != pytest.approx(STIR.pose[0, 0])
 
 
-def test_a_pose_out_of_reach_is_refused_before_anything_starts():
-    with pytest.raises(RigError, match="does not reach"):
+def test_a_pose_out_of_reach_is_refused_and_a_pouring_arm_has_no_cameras():
+    with pytest.raises(RigError, match="cup.position"):
         emulated(RIG, STIR.pose[0] + [3.0, 0, 0, 0, 0, 0])
-
-
-def test_a_pouring_arm_has_no_cameras():
-    from bolfi_liquids.hardware.motion import ready_to_pour
-
     rig = emulated(RIG, ready_to_pour(RIG, 0.03, 0.2), tool="pouring")
     assert not rig.make_cameras and rig.controller.world is None
+
+
+@pytest.mark.parametrize(("kind", "rate"), [("cb3", 125.0), ("e-series", 500.0)])
+def test_the_arm_that_is_servoed_along_a_stir_is_where_it_was_reckoned(kind, rate):
+    robot = RIG.robot.model_copy(update={"controller": kind, "rate": rate})
+    rig, frame = RIG.model_copy(update={"robot": robot}), cup_frame(RIG.cup)
+    path = strokes(rig)[0]
+    arm, clock = opened(emulated(rig, path.pose[0]).controller, rig)
+    way = []
+    for pose in frame.to_base(path.pose):
+        arm.command(pose)
+        clock.sleep(1.0 / rate)
+        way.append(arm.read().pose)
+    found = frame.from_base(np.array(way))[:, :3]
+    off = np.linalg.norm(found - servoed(path).position, axis=1)
+    assert off.max() < 1e-4
+    # against a path that was not servoed
+    assert np.linalg.norm(found - path.pose[:, :3], axis=1).max() > 5e-3

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.csv_file import CsvAppender
 from bolfi_liquids.hardware.recorder.directory import start_directory
-from bolfi_liquids.hardware.recorder.sample import Sample
-from bolfi_liquids.hardware.vision.frame_measurement import FrameMeasurement
+from bolfi_liquids.hardware.recorder.samples import Sample
+from bolfi_liquids.hardware.vision.frame import FrameMeasurement
 from closed_form_session import COMPLETED, DELAY, HOST, RIG, WAY, frames_of, samples_of
 
 

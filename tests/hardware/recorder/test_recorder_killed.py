@@ -15,13 +15,12 @@ from bolfi_liquids.hardware.board import SPAWN, Board, Who, host_time  # noqa: E
 from bolfi_liquids.hardware.cameras.rendered import Timing  # noqa: E402
 from bolfi_liquids.hardware.recorder.directory import start_directory  # noqa: E402
 from bolfi_liquids.hardware.recorder.finalise import finalise  # noqa: E402
-from bolfi_liquids.hardware.recorder.process import run_recorder  # noqa: E402
-from bolfi_liquids.hardware.recorder.sample import Sample  # noqa: E402
-from bolfi_liquids.hardware.recorder.views import camera_model  # noqa: E402
+from bolfi_liquids.hardware.recorder.samples import Sample, run_recorder
 from bolfi_liquids.hardware.rendering import Look, Scene  # noqa: E402
 from bolfi_liquids.hardware.rendering.drawing import prepare  # noqa: E402
 from bolfi_liquids.hardware.rig_file import bundled_rig  # noqa: E402
 from bolfi_liquids.hardware.session.camera_process import WHO, run_camera  # noqa: E402
+from bolfi_liquids.hardware.vision.stick_view import camera_model
 from rendered_faults import FaultyCamera  # noqa: E402
 from rendered_scenes import MovingWorld  # noqa: E402
 

@@ -1,20 +1,27 @@
+"""The control process: its queues, its motion loop on a stepped clock, and faults during a motion.
+
+The loop moves the emulated arm, or `URArm` by an emulated controller in this thread. `test_faults`
+has the faults that kill or stop whole processes, with the real client and in real time.
+"""
+
 import os
 import signal
 import time
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware.board import SPAWN, Board, Row, Who, host_time
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
+from bolfi_liquids.hardware import emulated
+from bolfi_liquids.hardware.board import SPAWN, Board, Row, Trouble, Who, host_time
+from bolfi_liquids.hardware.emulated.rig import patient as rehearsed
 from bolfi_liquids.hardware.motion.kinematics import forward, inverse
+from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.motion.pour_paths import approach_pour, pour_path, ready_to_pour
 from bolfi_liquids.hardware.motion.stir_paths import insert, stir
 from bolfi_liquids.hardware.recorder.events import read_events
-from bolfi_liquids.hardware.recorder.sample import Sample
+from bolfi_liquids.hardware.recorder.samples import Sample
 from bolfi_liquids.hardware.rig_file import bundled_rig
-from bolfi_liquids.hardware.robot.control_loop import WATCHDOG_PERIOD, refused
-from bolfi_liquids.hardware.robot.control_process import run_control
-from bolfi_liquids.hardware.robot.order_queue import Inbox, Vetting
+from bolfi_liquids.hardware.robot import ur
+from bolfi_liquids.hardware.robot.control_loop import WATCHDOG_PERIOD, refused, run_control
 from bolfi_liquids.hardware.robot.orders import (
     Ask,
     Assignment,
@@ -29,50 +36,62 @@ from bolfi_liquids.hardware.robot.orders import (
     Told,
     fingerprint,
 )
-from bolfi_liquids.hardware.robot.path_queue import Course, Leg, Trail, advanced, queued
-from bolfi_liquids.hardware.robot.sample_queue import Outlet
-from bolfi_liquids.hardware.robot.ur import URController
+from bolfi_liquids.hardware.robot.queues import (
+    Course,
+    Inbox,
+    Leg,
+    Outlet,
+    Trail,
+    Vetting,
+    advanced,
+    queued,
+)
 from bolfi_liquids.hardware.safety.guards import Trip
 from bolfi_liquids.hardware.safety.limits import workspace
 from bolfi_liquids.hardware.safety.preflight import failures
 from scipy.spatial.transform import Rotation
 from short_rig import short_rig
+from stepped_clock import SteppedClock
 from ur_controller.patience import patient
 from ur_controller.process import ControllerProcess
 
-RIG = patient(bundled_rig())
-QUICK = patient(short_rig())
+RIG = bundled_rig()
+QUICK = short_rig()
+PATH = stir(QUICK)
 PERIOD = 1.0 / RIG.robot.rate
 FRAME = cup_frame(RIG.cup)
 
 
+# -- queues
+
+
 def leg(number, length):
     path = insert(RIG)
-    base = FRAME.to_base(path.pose[:length]) + number
-    return Leg(number, path, base)
+    return Leg(number, path, FRAME.to_base(path.pose[:length]) + number)
 
 
 def play(course, ticks):
     told = []
     for _ in range(ticks):
         course, turn = advanced(course)
-        told.append((course.hold[0], turn))
+        told.append((course.hold[2], turn))
     return course, told
 
 
 def test_paths_are_played_one_after_the_other_and_the_last_pose_is_held():
     start = Course(np.zeros(6))
-    course = queued(queued(start, leg(1, 3)), leg(2, 2))
-    course, told = play(course, 8)
+    course, told = play(queued(queued(start, leg(1, 3)), leg(2, 2)), 8)
     began = [(k, turn.began.number) for k, (_, turn) in enumerate(told) if turn.began]
     done = [(k, turn.done.number) for k, (_, turn) in enumerate(told) if turn.done]
-    assert began == [(0, 1), (3, 2)]
-    assert done == [(3, 1), (5, 2)]
-    assert course.hold == pytest.approx(leg(2, 2).base[-1])
-    assert course.leg is None
+    assert began == [(0, 1), (3, 2)] and done == [(3, 1), (5, 2)]
+    assert course.hold == pytest.approx(leg(2, 2).base[-1]) and course.leg is None
     held = [*leg(1, 3).base, *leg(2, 2).base]
-    assert [x for x, _ in told[:5]] == [pose[0] for pose in held]
+    assert [z for z, _ in told[:5]] == [pose[2] for pose in held]
     assert play(start, 3)[0] == start
+    # joined paths keep their time: what is commanded already is not commanded again
+    base = leg(1, 3).base
+    _, told = play(queued(Course(base[0]), leg(1, 3)), 2)
+    assert [z for z, _ in told] == [pose[2] for pose in base[1:]] and base[0, 2] != base[1, 2]
 
 
 def test_the_trail_measures_the_distance_from_the_nearest_recent_set_point():
@@ -88,23 +107,19 @@ def test_the_trail_measures_the_distance_from_the_nearest_recent_set_point():
     assert trail.error(pose + [0.02, 0, 0, -0.1, 0, 0])[1] == pytest.approx(0.1)
 
 
-def sample(index):
-    return Sample._make([index, *np.linspace(0.1, 1.7, 19).tolist()])
-
-
 def test_a_set_point_refused_after_a_stall_is_an_overrun():
     lost = "the connection to the controller is lost"
     assert refused(lost, True, 0.5 * WATCHDOG_PERIOD) == Trip("link", lost)
     assert refused(lost, False, 2.0 * WATCHDOG_PERIOD) == Trip("link", lost)
-    assert refused(lost, True, 2.0 * WATCHDOG_PERIOD).reason.startswith(
-        "overrun: this computer sent"
-    )
+    assert refused(lost, True, 2.0 * WATCHDOG_PERIOD).guard == "overrun"
 
 
 def test_samples_are_handed_on_in_order_and_a_full_pipe_does_not_wait():
+    def sample(index):
+        return Sample._make([index, *np.linspace(0.1, 1.7, 19).tolist()])
+
     reading, writing = SPAWN.Pipe(duplex=False)
-    outlet = Outlet(writing)
-    start = time.monotonic()
+    outlet, start = Outlet(writing), time.monotonic()
     for index in range(2000):
         outlet.put(sample(index))
     assert time.monotonic() - start < 10.0  # 2000 waits of 5 ms
@@ -121,33 +136,20 @@ def test_samples_are_handed_on_in_order_and_a_full_pipe_does_not_wait():
     writing.close()
 
 
-def received(orders):
-    """What an inbox makes of orders, the end of main among them."""
+def test_orders_come_in_their_order_and_the_end_of_main_is_a_reason_to_stop(monkeypatch):
+    monkeypatch.setattr("bolfi_liquids.hardware.robot.queues.hurry", lambda: "normal")
     mine, its = SPAWN.Pipe()
-    inbox, items = Inbox(its), []
-    for order in orders:
+    inbox, items, end = Inbox(its), [], time.monotonic() + 5.0
+    for order in (Ask(), Stop("enough"), "go", Leave()):
         mine.send(order)
     mine.close()
     inbox.start()
-    end = time.monotonic() + 5.0
-    while time.monotonic() < end and (not items or items[-1] != GONE):
+    while time.monotonic() < end and len(items) < 5:
         if (item := inbox.take()) is not None:
             items.append(item)
-    return items
-
-
-GONE = Trip("main", "the main process is gone")
-
-
-def test_orders_come_in_their_order_and_the_end_of_main_is_a_reason_to_stop():
-    orders = [Ask(), Stop("enough"), "go", Leave()]
-    assert received(orders) == [
-        Ask(),
-        Trip("stop", "enough"),
-        Trip("order", "an order was refused: 'go' is none"),
-        Leave(),
-        GONE,
-    ]
+    ask, stop, wrong, leave, gone = items
+    assert (ask, stop, leave) == (Ask(), Trip("stop", "enough"), Leave())
+    assert (wrong.guard, gone.guard) == ("order", "main") and "'go'" in wrong.reason
 
 
 def vetting():
@@ -166,9 +168,9 @@ def work(vetting, slices=1000):
 
 def test_paths_that_continue_each_other_are_checked_in_slices():
     vet = vetting()
-    for path in (insert(RIG), stir(QUICK)):
+    for path in (insert(RIG), PATH):
         vet.add(path)
-    for number, path in enumerate((insert(RIG), stir(QUICK))):
+    for number, path in enumerate((insert(RIG), PATH)):
         # a slice is far from the whole path
         assert work(vet, 3) is None and vet.busy
         leg = work(vet)
@@ -177,117 +179,26 @@ def test_paths_that_continue_each_other_are_checked_in_slices():
     assert not vet.busy and vet.work() is None
 
 
-NAN = insert(RIG)._replace(pose=insert(RIG).pose * np.nan)
-ASIDE = insert(RIG)._replace(pose=insert(RIG).pose + [0.001, 0, 0, 0, 0, 0])
-REFUSED = {
-    "elsewhere": (stir(QUICK), "rad of a joint from the arm"),
-    "a little aside": (ASIDE, "starts 1.000 mm, 0.00000 rad from the last set-point"),
-    "NaN": (NAN, "not finite"),
-    "no path": ("there", "refused"),
-}
+def test_a_path_that_cannot_be_followed_is_a_reason_to_stop():
+    down = insert(RIG)
+    for path, words in (
+        (PATH, "rad of a joint from the arm"),
+        (down._replace(pose=down.pose + [0.001, 0, 0, 0, 0, 0]), "starts 1.000 mm"),
+        (down._replace(pose=down.pose * np.nan), "not finite"),
+        ("there", "refused"),
+    ):
+        vet = vetting()
+        vet.add(path)
+        item = work(vet)
+        assert isinstance(item, Trip) and item.guard == "order" and words in item.reason, item
 
 
-@pytest.mark.parametrize("name", REFUSED)
-def test_a_path_that_cannot_be_followed_is_a_reason_to_stop(name):
-    path, words = REFUSED[name]
-    vet = vetting()
-    vet.add(path)
-    item = work(vet)
-    assert isinstance(item, Trip) and item.guard == "order" and words in item.reason, item
-
-
-class Controlled:
-    """A control process on an emulator, with a recorder that is only a row on the board."""
-
-    def __init__(self, directory):
-        space = workspace(QUICK, "stirring")
-        base = FRAME.to_base(stir(QUICK).pose[0])
-        joints = inverse(space.arm, base, space.start, tcp=space.tcp)
-        self.emulator = ControllerProcess.start(joints=joints, options={"seed": 1})
-        self.directory = directory
-        self.board = Board()
-        self.link, its = SPAWN.Pipe()
-        self.samples, writing = SPAWN.Pipe(duplex=False)
-        controller, where = URController(self.emulator.address), str(directory)
-        to = Assignment(QUICK, controller, "stirring", True, where, base[None], cameras=False)
-        self.process = SPAWN.Process(target=run_control, args=(to, self.board, its, writing))
-        self.process.start()
-        its.close()
-        writing.close()
-
-    def wait_for(self, kind, timeout=15.0):
-        """The next report of a kind; the recorder's row is kept fresh meanwhile."""
-        end = time.monotonic() + timeout
-        while time.monotonic() < end:
-            self.breathe()
-            if self.link.poll():
-                try:
-                    report = self.link.recv()
-                except EOFError:
-                    raise AssertionError(f"ended early: {self.events('stopped')}") from None
-                if isinstance(report, kind):
-                    return report
-        raise TimeoutError(kind.__name__)
-
-    def breathe(self, seconds=0.01):
-        end = time.monotonic() + seconds
-        while True:
-            self.board.write(Who.RECORDER, Row(host_time()))
-            while self.samples.poll():
-                try:
-                    self.samples.recv()
-                except EOFError:
-                    return
-            if time.monotonic() > end:
-                return
-            time.sleep(0.005)
-
-    def events(self, kind):
-        return [event for event in read_events(self.directory) if event["kind"] == kind]
-
-    def close(self):
-        self.link.close()
-        self.process.join(3.0)
-        if self.process.is_alive():
-            self.process.kill()
-            self.process.join()
-        self.samples.close()
-        self.emulator.close()
-
-
-@pytest.fixture
-def controlled(tmp_path):
-    """A real control process, on a real emulator."""
-    pytest.importorskip("rtde_control")
-    running = Controlled(tmp_path)
-    yield running
-    running.close()
-
-
-@pytest.mark.punctual  # what a signal does to a process, and to the arm that it moves
-@pytest.mark.parametrize(
-    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.minutes)]
-)
-def test_a_signal_stops_the_arm(controlled, number):
-    controlled.wait_for(Checked)
-    controlled.link.send(Follow(stir(QUICK)))
-    controlled.wait_for(Began)
-    controlled.breathe(1.0)
-    assert not controlled.emulator.admin.state().at_rest
-    os.kill(controlled.process.pid, number)
-    stopped = controlled.wait_for(Stopped)
-    assert number.name in stopped.reason
-    controlled.process.join(3.0)
-    assert controlled.process.exitcode == 1
-    assert controlled.emulator.admin.state().at_rest
-    assert controlled.emulator.admin.state().runtime_state == 1
-    (event,) = controlled.events("stopped")
-    assert event["reason"] == stopped.reason and event["guard"] == stopped.guard
+# -- the loop, on a stepped clock
 
 
 @pytest.fixture
 def control(stepped):
-    """The same in this thread, on a clock that is stepped."""
+    """Makes the control process of a UR arm that rests where a stir begins."""
 
     def start(rig=QUICK, tool="stirring", pose=None, **options):
         return stepped(rig, tool, stir(rig).pose[0] if pose is None else pose, **options)
@@ -295,34 +206,59 @@ def control(stepped):
     return start
 
 
-def test_a_path_is_followed_recorded_and_logged(control):
-    one, path = control(), stir(QUICK)
-    one.when(Checked, lambda: one.orders.put(Follow(path)))
+@pytest.fixture
+def rehearsal(stepped_loop, tmp_path):
+    """The same of the emulated arm."""
+
+    def start(rig=QUICK):
+        controller = emulated(rig, PATH.pose[0]).controller
+        clock = SteppedClock(controller.begun)
+        arm, probes = controller._replace(clock=clock), np.empty((0, 6))
+        to = Assignment(rig, arm, "stirring", True, str(tmp_path), probes, cameras=False)
+        return stepped_loop(to, clock)
+
+    return start
+
+
+@pytest.mark.parametrize("arm", ["control", "rehearsal"])
+def test_a_path_is_followed_recorded_and_logged(request, arm):
+    one = request.getfixturevalue(arm)()
+    one.when(Checked, lambda: one.orders.put(Follow(PATH)))
     one.when(Began, lambda: one.orders.put(Ask()), after=1.0)
     one.when(Done, lambda: one.orders.put(Leave()))
     assert one.run() == 0
-    kinds = [type(report) for report in one.reports]
-    assert kinds == [Checked, Began, Told, Done, Left]
+    assert [type(report) for report in one.reports] == [Checked, Began, Told, Done, Left]
     checked, began, told, done, _ = one.reports
     assert failures(checked.checks) == ""
     assert {check.name for check in checked.checks} >= {
         *("connection", "robot mode", "safety", "program", "box", "payload", "tool's centre"),
-        *("force at rest", "recorder", "disk", "controller's limits", "kinematics"),
+        *("force at rest", "recorder", "disk", "kinematics", "speed slider", "at rest"),
     }
     assert len(told.readings) > 10 and all(reading.green for reading in told.readings)
-    assert done.robot_time - began.robot_time == pytest.approx(path.duration, abs=2.5 * PERIOD)
+    assert done.robot_time - began.robot_time == pytest.approx(PATH.duration, abs=2.5 * PERIOD)
     assert [row.index for row in one.rows] == list(range(len(one.rows)))
     # a package for each tick: one is missed while the loop finds its place between two of them
     steps = np.diff([row.time for row in one.rows if row.stirring]) / PERIOD
     assert sorted(np.round(steps, 6))[:-1] == [1.0] * (len(steps) - 1) and max(steps) < 2.1
     # what was recorded is the star, with the servo's lag
     stirred = np.array([row[3:6] for row in one.rows if row.stirring])
-    away = [np.linalg.norm(path.pose[:, :3] - place, axis=1).min() for place in stirred[::20]]
+    away = [np.linalg.norm(PATH.pose[:, :3] - place, axis=1).min() for place in stirred[::20]]
     assert max(away) < 0.003
-    assert np.ptp(stirred[:, 0]) == pytest.approx(np.ptp(path.pose[:, 0]), abs=0.003)
+    assert np.ptp(stirred[:, 0]) == pytest.approx(np.ptp(PATH.pose[:, 0]), abs=0.003)
     (event,) = one.events("began")
-    assert event["hash"] == fingerprint(path) and event["stirring"]
+    assert event["hash"] == fingerprint(PATH) and event["stirring"]
     assert one.events("done") and not one.events("stopped")
+
+
+def test_a_session_on_the_stepped_clock_is_the_same_each_time(control):
+    runs = []
+    for _ in range(2):
+        one = control()
+        one.when(Checked, lambda one=one: one.orders.put(Follow(PATH)))
+        one.when(Began, lambda one=one: one.orders.put(Stop("enough")), after=0.5)
+        one.run()
+        runs.append(str(one.rows))
+    assert runs[0] == runs[1]
 
 
 def test_a_dry_run_looks_and_refuses_to_move(control):
@@ -336,12 +272,108 @@ def test_a_dry_run_looks_and_refuses_to_move(control):
 
 
 def test_an_arm_outside_its_box_is_not_armed(control):
-    one = control(pose=stir(QUICK).pose[0] + [0, 0, 0.25, 0, 0, 0])
+    one = control(pose=PATH.pose[0] + [0, 0, 0.25, 0, 0, 0])
     assert one.run() == 1
     (checked,) = one.reports
     assert "box: the tool is at" in failures(checked.checks)
     assert one.events("refused") and checked.pose is None
     assert one.emulator.controller.started == 0
+
+
+def changed(**change):
+    pose = PATH.pose.copy()
+    pose[change["at"]] = change["to"]
+    return PATH._replace(pose=pose)
+
+
+PUSH = (30.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NAN_PATH = changed(at=(3, 1), to=np.nan)
+OUTSIDE = changed(at=(slice(None), 0), to=0.2)
+# what happens during a motion, the time in which the arm must rest [s], the guard
+FAULTS = {
+    "late packages": (lambda one: setattr(one.emulator, "late", 1.0), 0.3, "silence"),
+    "a frozen link": (lambda one: one.emulator.freeze(10.0), 0.3, "silence"),
+    "a dropped link": (lambda one: one.emulator.drop(), 0.3, "link"),
+    "a silent recorder": (lambda one: one.silent.add(Who.RECORDER), 0.6, "recorder"),
+    "a dead recorder": (lambda one: one.recorder.close(), 0.3, "recorder pipe"),
+    "a full disk": (
+        lambda one: one.trouble.update({Who.RECORDER: Trouble.WRITE_FAILED}),
+        0.3,
+        "recorder health",
+    ),
+    "a silent camera": (lambda one: one.silent.add(Who.CAMERA_XZ), 0.5, "camera xz"),
+    "a frozen camera": (
+        lambda one: one.trouble.update({Who.CAMERA_YZ: Trouble.SAME_PICTURE}),
+        0.3,
+        "camera yz health",
+    ),
+    "a force": (lambda one: setattr(one.emulator.controller, "pressed", PUSH), 0.3, "force"),
+    "a protective stop": (
+        lambda one: one.emulator.controller.protective_stop("by the test"),
+        0.3,
+        "safety",
+    ),
+    "a stall": (lambda one: one.clock.sleep(0.3), 0.3, "overrun"),
+    "a short stall": (lambda one: one.clock.sleep(0.06), 0.3, "overrun"),
+    "an order of NaN": (lambda one: one.orders.put(Follow(NAN_PATH)), 0.3, "order"),
+    "an order outside": (lambda one: one.orders.put(Follow(OUTSIDE)), 0.3, "order"),
+    "leaving": (lambda one: one.orders.put(Leave()), 0.3, "stop"),
+    "a signal": (lambda one: one.links.signals.append("SIGHUP"), 0.3, "stop"),
+    # nothing is to be noticed first: all of it is the brake's time
+    "main's stop": (lambda one: one.orders.put(Stop("enough")), 0.05, "stop"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_stops_the_arm_for_good_and_says_why(control, name):
+    act, bar, guard = FAULTS[name]
+    one = control(cameras=True)
+    stopped, lasted = one.stopped_by(lambda: act(one), Follow(PATH), 1.0)
+    assert stopped.guard == guard and stopped.reason
+    assert lasted < bar
+    # samples go on until the arm rests, as far as the link lets them through
+    assert [row.index for row in one.rows] == list(range(len(one.rows)))
+
+
+@pytest.mark.parametrize("deceleration", [ur.STOP_DECELERATION, 1.0])
+def test_the_arm_brakes_as_its_driver_asks(control, monkeypatch, deceleration):
+    monkeypatch.setattr(ur, "STOP_DECELERATION", deceleration)
+    one, speeds = control(cameras=True), []
+
+    def stop():
+        speeds.append(np.linalg.norm(one.emulator.controller.arm.velocity[:3]))
+        one.orders.put(Stop("enough"))
+
+    _, lasted = one.stopped_by(stop, Follow(PATH), 0.9)
+    (speed,) = speeds
+    assert speed == pytest.approx(QUICK.stirring.speed, rel=0.05)
+    assert speed / deceleration < lasted < speed / deceleration + 2 * PERIOD
+
+
+@pytest.mark.parametrize("stall", [0.06, 0.9])
+def test_a_rehearsal_bears_a_stall_and_the_rig_s_own_limits_bear_none(rehearsal, stall):
+    for rig, code in ((rehearsed(QUICK), 0), (QUICK, 1)):
+        one = rehearsal(rig)
+        one.when(Checked, lambda one=one: one.orders.put(Follow(PATH)))
+        one.when(Began, lambda one=one: one.clock.sleep(stall), after=1.0)
+        one.when(Done, lambda one=one: one.orders.put(Leave()))
+        assert one.run() == code
+        if code == 0:
+            began, done = one.reported(Began)[0], one.reported(Done)[0]
+            # the path is delayed, and not hurried
+            late = done.robot_time - began.robot_time - PATH.duration
+            assert late == pytest.approx(stall, abs=4 * PERIOD)
+        else:
+            assert one.reported(Stopped)[0].guard == "overrun"
+
+
+def test_a_patient_rig_bears_a_frozen_link(control):
+    """The twin of the test above: what trips there is the limits, not the stepped clock."""
+    one = control(patient(QUICK))
+    one.when(Checked, lambda: one.orders.put(Follow(PATH)))
+    one.when(Began, lambda: one.emulator.freeze(0.06), after=1.0)
+    one.when(Done, lambda: one.orders.put(Leave()))
+    assert one.run() == 0
 
 
 POUR = pour_path(
@@ -360,13 +392,13 @@ def test_a_source_that_pours_is_turned_back_before_the_arm_stops(control):
     space = workspace(RIG, "pouring")
     upright = forward(space.arm, one.emulator.controller.snapshot.joints, tcp=space.tcp)
     assert upright[3:] == pytest.approx(RIG.robot.pouring_orientation, abs=0.1)
-    assert one.events("turning_back")
+    assert one.events("turning_back") and not one.events("not_turned_back")
 
 
 def test_a_source_is_not_turned_back_on_a_force(control):
     one = control(RIG, "pouring", READY)
-    push = one.emulator.controller.force.press
-    stopped, _ = one.stopped_by(lambda: push((30.0, 0.0, 0.0, 0.0, 0.0, 0.0)), Follow(POUR), 3.5)
+    machine = one.emulator.controller
+    stopped, _ = one.stopped_by(lambda: setattr(machine, "pressed", PUSH), Follow(POUR), 3.5)
     assert stopped.guard == "force"
     assert not one.events("turning_back")
 
@@ -375,10 +407,59 @@ def test_a_source_that_came_tilted_is_not_turned_back_to_that(control):
     """A way there that is given up leads back to wherever the arm was jogged to."""
     turned = Rotation.from_rotvec([0.0, 0.4, 0.0]) * Rotation.from_rotvec(READY[3:])
     start = np.array([*READY[:3] + [0.0, 0.0, 0.03], *turned.as_rotvec()])
-    one = control(RIG, "pouring", start)
     path = approach_pour(RIG, start, distance=0.03, lip_height=0.2)
-    stopped, _ = one.stopped_by(
-        lambda: one.orders.put(Stop("enough")), Follow(path), 0.9 * path.duration
-    )
+    one, late = control(RIG, "pouring", start), 0.9 * path.duration
+    stopped, _ = one.stopped_by(lambda: one.orders.put(Stop("enough")), Follow(path), late)
     assert stopped == Stopped("enough", "stop")
     assert not one.events("turning_back")
+
+
+# -- a real control process, on a real emulator
+
+
+@pytest.mark.punctual  # what a signal does to a process, and to the arm that it moves
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.minutes)]
+)
+def test_a_signal_stops_the_arm(tmp_path, number):
+    pytest.importorskip("rtde_control")
+    rig, board, start = patient(QUICK), Board(), FRAME.to_base(PATH.pose[0])
+    link, its = SPAWN.Pipe()
+    samples, writing = SPAWN.Pipe(duplex=False)
+
+    def wait_for(kind, timeout=15.0):
+        """The next report of a kind; the recorder's row is kept fresh meanwhile."""
+        end = time.monotonic() + timeout
+        while time.monotonic() < end:
+            board.write(Who.RECORDER, Row(host_time()))
+            while samples.poll():
+                samples.recv()
+            if link.poll(0.005) and isinstance(report := link.recv(), kind):
+                return report
+        return None
+
+    with ControllerProcess.at_pose(rig, PATH.pose[0]) as emulator:
+        controller, where = ur.URController(emulator.address), str(tmp_path)
+        to = Assignment(rig, controller, "stirring", True, where, start[None], cameras=False)
+        process = SPAWN.Process(target=run_control, args=(to, board, its, writing))
+        process.start()
+        its.close()
+        writing.close()
+        try:
+            assert wait_for(Checked)
+            link.send(Follow(PATH))
+            assert wait_for(Began)
+            assert wait_for(Done, timeout=1.0) is None  # it moves meanwhile
+            assert not emulator.admin.state().resting
+            os.kill(process.pid, number)
+            stopped = wait_for(Stopped)
+            process.join(3.0)
+            assert process.exitcode == 1
+            assert number.name in stopped.reason
+            state = emulator.admin.state()
+            assert state.resting and state.runtime_state == 1
+        finally:
+            process.kill()
+            process.join()
+    (event,) = (one for one in read_events(tmp_path) if one["kind"] == "stopped")
+    assert (event["reason"], event["guard"]) == (stopped.reason, stopped.guard)

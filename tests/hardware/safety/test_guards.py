@@ -61,36 +61,36 @@ def row(who, **changes):
     return seen(rows={who: Row(beat=NOW - 0.02)._replace(**changes)})
 
 
-CASES = {
-    "overrun": (seen(late=0.051), "overrun: .*0.051 s, the limit is 0.05"),
-    "link": (bad(connected=False), "link: the connection to the controller is lost"),
-    "silence": (seen(now=NOW + 0.051), "silence: .* s, the limit is 0.05"),
-    "protective stop": (bad(safety_bits=1 << 2 | 1 << 10), "safety: .*protective stopped, stopped"),
-    "emergency stop": (bad(safety_bits=1 << 7), "safety: .*emergency stopped"),
-    "normal and a fault": (bad(safety_bits=1 | 1 << 9), "safety: .*fault"),
-    "no bits": (bad(safety_bits=0), "safety: "),
-    "reduced": (bad(safety_bits=2), "safety: .*reduced"),
-    "mode": (bad(robot_mode=5), "mode: robot_mode = 5, not 7"),
-    "program": (bad(runtime_state=1), "program: .*runtime_state = 1"),
-    "paused": (bad(runtime_state=4), "program: .*runtime_state = 4"),
-    "force": (bad(wrench=(0.5, 22.1, -3.0, 0, 0, 0)), "force: .*20.1 N is above 20"),
-    "torque": (bad(wrench=(0.5, 2.0, -3.0, 0, 5.2, 0)), "torque: .*5.2 Nm is above 5"),
-    "NaN force": (bad(wrench=(np.nan, 2.0, -3.0, 0, 0, 0)), "force: .*nan"),
-    "tracking": (seen(error=0.0101), "tracking: .*m is above 0.01"),
-    "turning": (seen(turn_error=0.2), "turning: "),
-    "speed": (bad(velocity=(0.0, 0.0, -0.24, 0, 0, 0)), "speed: .*m/s is above 0.225"),
-    "box": (seen(position=(0.0, -0.051, 0.25)), "box: "),
-    "below the box": (seen(position=(0.0, 0.0, 0.2)), "box: "),
-    "slider": (bad(speed_scaling=0.5), "slider: .*50 %"),
-    "camera age": (row(Who.CAMERA_XZ, beat=NOW - 0.16), "camera xz: .* s, the limit is 0.15"),
-    "camera never": (row(Who.CAMERA_YZ, beat=0.0), "camera yz: .*inf s"),
-    "same picture": (row(Who.CAMERA_YZ, trouble=Trouble.SAME_PICTURE), "camera yz.*same picture"),
-    "bad stamps": (row(Who.CAMERA_XZ, trouble=Trouble.BAD_STAMPS), "camera xz.*stamps"),
-    "camera lost": (row(Who.CAMERA_XZ, trouble=Trouble.SOURCE_LOST), "xz gives no more pictures"),
-    "disk": (row(Who.RECORDER, trouble=Trouble.WRITE_FAILED), "recorder cannot write"),
-    "recorder": (row(Who.RECORDER, beat=NOW - 0.31), "recorder: .* s, the limit is 0.3"),
-    "recorder gone": (seen(backlog=float("inf")), "recorder's process is gone"),
-    "recorder slow": (seen(backlog=0.6), "not taken 0.60 s of samples"),
+CASES = {  # what is seen, and the guard that trips
+    "overrun": (seen(late=0.051), "overrun"),
+    "link": (bad(connected=False), "link"),
+    "silence": (seen(now=NOW + 0.051), "silence"),
+    "protective stop": (bad(safety_bits=1 << 2 | 1 << 10), "safety"),
+    "emergency stop": (bad(safety_bits=1 << 7), "safety"),
+    "normal and a fault": (bad(safety_bits=1 | 1 << 9), "safety"),
+    "no bits": (bad(safety_bits=0), "safety"),
+    "reduced": (bad(safety_bits=2), "safety"),
+    "mode": (bad(robot_mode=5), "mode"),
+    "program": (bad(runtime_state=1), "program"),
+    "paused": (bad(runtime_state=4), "program"),
+    "force": (bad(wrench=(0.5, 22.1, -3.0, 0, 0, 0)), "force"),
+    "torque": (bad(wrench=(0.5, 2.0, -3.0, 0, 5.2, 0)), "torque"),
+    "NaN force": (bad(wrench=(np.nan, 2.0, -3.0, 0, 0, 0)), "force"),
+    "tracking": (seen(error=0.0101), "tracking"),
+    "turning": (seen(turn_error=0.2), "turning"),
+    "speed": (bad(velocity=(0.0, 0.0, -0.24, 0, 0, 0)), "speed"),
+    "box": (seen(position=(0.0, -0.051, 0.25)), "box"),
+    "below the box": (seen(position=(0.0, 0.0, 0.2)), "box"),
+    "NaN place": (seen(position=(0.0, np.nan, 0.25)), "box"),
+    "slider": (bad(speed_scaling=0.5), "slider"),
+    "camera age": (row(Who.CAMERA_XZ, beat=NOW - 0.16), "camera xz"),
+    "camera never": (row(Who.CAMERA_YZ, beat=0.0), "camera yz"),
+    "same picture": (row(Who.CAMERA_YZ, trouble=Trouble.SAME_PICTURE), "camera yz health"),
+    "bad stamps": (row(Who.CAMERA_XZ, trouble=Trouble.BAD_STAMPS), "camera xz health"),
+    "disk": (row(Who.RECORDER, trouble=Trouble.WRITE_FAILED), "recorder health"),
+    "recorder": (row(Who.RECORDER, beat=NOW - 0.31), "recorder"),
+    "recorder gone": (seen(backlog=float("inf")), "recorder pipe"),
+    "recorder slow": (seen(backlog=0.6), "recorder pipe"),
 }
 
 
@@ -100,18 +100,15 @@ def test_nothing_trips_while_all_is_well():
 
 @pytest.mark.parametrize("name", CASES)
 def test_each_guard_trips_alone_and_says_why(name):
-    import re
-
-    one, words = CASES[name]
-    said = reason(one)
-    assert said is not None and re.search(words, said), said
+    one, guard = CASES[name]
+    trip = tripped(evaluate(one, RULES), one)
+    assert trip is not None and trip.guard == guard and trip.reason
 
 
 def test_every_guard_has_a_case():
     names = {reading.name for reading in evaluate(seen(), RULES)}
-    told = {(reason(one) or "").partition(":")[0] for one, _ in CASES.values()}
-    # the delay has a test of its own
-    assert names - told == {"delay"}
+    # the delay has a test of its own; both cameras' guards are made by one line
+    assert names - {guard for _, guard in CASES.values()} == {"delay"}
 
 
 def test_a_cause_is_named_before_its_effects():
@@ -150,10 +147,10 @@ def test_late_packages_are_seen_though_the_clock_goes_on():
     assert follow_clock(watch, seconds=2.0, late=lambda t: 0.0 if t < 1 else 0.1) > 0.09
 
 
-@pytest.mark.parametrize("drift", [1e-4, -1e-4])
-def test_clocks_that_drift_are_no_delay(drift):
-    watch = first_watch(WELL, NOW, WELL.wrench)
-    assert follow_clock(watch, seconds=1200.0, drift=drift) < 0.005
+def test_clocks_that_drift_are_no_delay():
+    for drift in (1e-4, -1e-4):
+        watch = first_watch(WELL, NOW, WELL.wrench)
+        assert follow_clock(watch, seconds=600.0, drift=drift) < 0.005
 
 
 def test_a_frozen_clock_is_silence():

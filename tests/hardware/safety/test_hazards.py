@@ -1,217 +1,118 @@
 """Each hazard of the client library and each safety requirement: its answer, and who tests it.
 
 The numbers are those of the project's notes on ur_rtde 1.6.5 (hazards 1 to 14) and of its safety
-requirements (S1 to S11).
+requirements (S1 to S11). Tests are "file: words of its name".
 """
 
 from pathlib import Path
-from typing import NamedTuple
 
-import pytest
-
-
-class Answer(NamedTuple):
-    """A hazard in short, the answer, and tests as "file: words of its name"."""
-
-    hazard: str
-    answer: str
-    tests: tuple[str, ...]
-
-
+CONTROL, DRIVER = "hardware/robot/control_process: ", "hardware/robot/ur_driver: "
+SESSION, ARMS = "hardware/session/session: ", "extensions/arms: "
+GUARDS, LIMITS = "hardware/safety/guards: ", "hardware/safety/limits: "
+MATRIX = "hardware/safety/faults: fault_during_motion"
+LIES = "hardware/safety/hazards: calls_that_lie_are_not_used"
 ANSWERS = {
-    "1": Answer(
-        "constructors hold Python's lock",
-        "the arm has a process of its own; main ends a control process that hangs",
-        (
-            "session/session: control_process_that_hangs_is_ended",
-            "session/session: leaves_nothing_behind",
-        ),
+    # constructors hold Python's lock: the arm has a process of its own; one that hangs is ended
+    "1": (f"{SESSION}control_process_that_hangs_is_ended", f"{SESSION}leaves_nothing_behind"),
+    # getters repeat the last value, servoL says True on a dead link: it stays lost in the driver
+    "2": (
+        f"{DRIVER}lost_link_is_seen_at_once_and_stays_lost",
+        f"{GUARDS}frozen_clock_is_silence",
+        f"{GUARDS}late_packages_are_seen",
     ),
-    "2": Answer(
-        "getters repeat the last value, servoL says True on a dead link",
-        "guards link, silence and delay; a lost link stays lost in the driver",
-        (
-            "robot/ur_driver: lost_link_is_seen_at_once_and_stays_lost",
-            "safety/guards: frozen_clock_is_silence",
-            "safety/guards: late_packages_are_seen",
-        ),
+    # the control interface reconnects by itself, and crashes: nothing is sent after a loss
+    "3": (f"{DRIVER}nothing_is_sent_though_the_library_reconnects", MATRIX),
+    # without a watchdog the arm goes on when the client dies: one of 10 Hz before any set-point
+    "4": (f"{DRIVER}watchdog_stops_the_arm", f"{ARMS}watchdog_stops_the_arm_for_good", MATRIX),
+    # a blocking call cannot kick: orders that wait are given at rest only; stop returns at once
+    "5": (f"{DRIVER}stop_returns_at_once",),
+    # an upload disarms the watchdog: one upload, by an interface that is then closed
+    "6": (f"{DRIVER}watchdog_stops_the_arm", f"{DRIVER}though_the_library_reconnects"),
+    # five calls read a register before it is written; getForwardKinematics(q, tcp) is wrong
+    "7": (LIES,),
+    "8": (LIES, "hardware/motion/kinematics: "),
+    # stopL, stopJ and setExternalForceTorque do something else: servoStop and stopScript only
+    "9": (LIES, f"{DRIVER}stop_returns_at_once"),
+    # waitPeriod truncates: an absolute clock; a tick that is late delays the path
+    "10": (LIES, f"{CONTROL}played_one_after_the_other", f"{CONTROL}rehearsal_bears_a_stall"),
+    # a NaN pose is accepted: paths are checked as a whole and each set-point in the driver
+    "11": (
+        f"{DRIVER}breaks_a_limit_is_not_sent",
+        f"{ARMS}set_point_that_breaks_a_limit",
+        f"{LIMITS}set_point_that_breaks_a_limit",
     ),
-    "3": Answer(
-        "the control interface reconnects by itself, and crashes",
-        "nothing is sent after a loss, the interface that moves the arm uploads no script, and the "
-        "process ends without the library's clean-up",
-        (
-            "robot/ur_driver: nothing_is_sent_though_the_library_reconnects",
-            "safety/faults: fault_during_motion",
-        ),
+    # after a protective stop nothing unlocks or uploads again: a person does
+    "12": (f"{DRIVER}protective_stop_is_told", LIES),
+    # no force sensor on the UR10: change since rest, from actual_TCP_force
+    "13": (f"{GUARDS}each_guard_trips_alone",),
+    # the rate that was asked may not be had: 125 Hz; times come from the controller's clock
+    "14": (f"{CONTROL}path_is_followed_recorded_and_logged",),
+    # dry run by default; armed=True needs what a typed sentence makes; a plan to read
+    "S1": (
+        f"{SESSION}dry_run_unless_it_is_armed",
+        f"{SESSION}nobody_is_armed_without_a_confirmation",
+        f"{SESSION}only_the_sentence_confirms",
+        f"{SESSION}plan_tells_where_how_fast",
     ),
-    "4": Answer(
-        "without a watchdog the arm goes on when the client dies",
-        "set-points instead of speeds, a watchdog of 10 Hz before the first of them",
-        ("robot/ur_driver: watchdog_stops_the_arm", "safety/faults: fault_during_motion"),
+    # software is no safety function: the plan says so; tool and payload are set and read back
+    "S2": (f"{SESSION}plan_tells_where", f"{ARMS}taking_control_sets_tool_and_payload"),
+    # pre-flight list
+    "S3": (
+        f"{CONTROL}arm_outside_its_box_is_not_armed",
+        f"{SESSION}no_controller_is_a_line",
+        "hardware/safety/preflight: ",
     ),
-    "5": Answer(
-        "a blocking call cannot kick",
-        "orders that wait are given at rest only, and before the watchdog; stop returns at once",
-        ("robot/ur_driver: stop_returns_at_once",),
+    # every commanded point: before the order, before the motion, and at each set-point
+    "S4": (
+        f"{LIMITS}refused_as_a_whole",
+        f"{LIMITS}box_s_margin",
+        f"{LIMITS}leaves_the_reach",
+        f"{CONTROL}path_that_cannot_be_followed",
     ),
-    "6": Answer(
-        "an upload disarms the watchdog",
-        "one upload, by an interface that is then closed; no path is ever uploaded",
-        (
-            "robot/ur_driver: watchdog_stops_the_arm",
-            "robot/ur_driver: though_the_library_reconnects",
-        ),
+    # the watchdog is kicked by the loop alone, while all guards are green
+    "S5": (f"{DRIVER}watchdog_stops_the_arm", MATRIX),
+    # guards at each tick
+    "S6": (f"{GUARDS}every_guard_has_a_case", f"{GUARDS}each_guard_trips_alone"),
+    # a guard stops the arm permanently
+    "S7": (f"{SESSION}stop_is_final", f"{CONTROL}fault_stops_the_arm_for_good"),
+    # a camera, this computer or the link dies
+    "S8": (MATRIX, f"{CONTROL}fault_stops_the_arm_for_good"),
+    # processes of their own; every end of main is a stop
+    "S9": (f"{SESSION}however_main_ends", f"{CONTROL}signal_stops_the_arm"),
+    # pouring: the lip is the tool's centre; a source is turned back where the robot is well
+    "S10": (
+        f"{DRIVER}taking_control_sets_tool",
+        "hardware/motion/paths: pour_turns_about_the_resting_lip",
+        f"{CONTROL}turned_back_before_the_arm_stops",
+        f"{CONTROL}not_turned_back_on_a_force",
     ),
-    "7": Answer(
-        "five calls read a register before it is written",
-        "none of them is used",
-        ("safety/hazards: calls_that_lie_are_not_used",),
-    ),
-    "8": Answer(
-        "getForwardKinematics(q, tcp) is wrong",
-        "kinematics of our own",
-        ("safety/hazards: calls_that_lie_are_not_used", "motion/kinematics: "),
-    ),
-    "9": Answer(
-        "stopL, stopJ and setExternalForceTorque do something else",
-        "servoStop and stopScript only",
-        ("safety/hazards: calls_that_lie_are_not_used", "robot/ur_driver: stop_returns_at_once"),
-    ),
-    "10": Answer(
-        "waitPeriod truncates",
-        "an absolute clock; a tick that is late delays the path",
-        (
-            "safety/hazards: calls_that_lie_are_not_used",
-            "robot/control_process: played_one_after_the_other",
-        ),
-    ),
-    "11": Answer(
-        "a NaN pose is accepted",
-        "paths are checked as a whole and each set-point in the driver",
-        (
-            "robot/ur_driver: breaks_a_limit_is_not_sent",
-            "safety/limits: set_point_that_breaks_a_limit",
-        ),
-    ),
-    "12": Answer(
-        "after a protective stop",
-        "nothing unlocks or uploads again: a person does, and starts a new session",
-        ("robot/ur_driver: protective_stop_is_told", "safety/hazards: calls_that_lie_are_not_used"),
-    ),
-    "13": Answer(
-        "no force sensor on the UR10",
-        "change since rest, from actual_TCP_force, which both generations have",
-        ("safety/guards: each_guard_trips_alone",),
-    ),
-    "14": Answer(
-        "the rate that was asked may not be had",
-        "125 Hz, a divisor of both base rates; times come from the controller's clock",
-        ("robot/control_process: path_is_followed_recorded_and_logged",),
-    ),
-    "S1": Answer(
-        "dry run by default",
-        "armed=True needs what a typed sentence makes; a plan to read",
-        (
-            "session/session: dry_run_unless_it_is_armed",
-            "session/session: nobody_is_armed_without_a_confirmation",
-            "session/session: only_the_sentence_confirms",
-            "session/session: plan_tells_where_how_fast",
-        ),
-    ),
-    "S2": Answer(
-        "software is no safety function",
-        "the plan says so; tool and payload are set and read back before each session",
-        (
-            "session/session: plan_tells_where",
-            "robot/control_process: followed_recorded_and_logged",
-        ),
-    ),
-    "S3": Answer(
-        "pre-flight list",
-        "safety/preflight.py",
-        (
-            "robot/control_process: arm_outside_its_box_is_not_armed",
-            "session/session: no_controller_is_a_line",
-        ),
-    ),
-    "S4": Answer(
-        "every commanded point",
-        "safety/limits.py, before the order, before the motion, and at each set-point",
-        (
-            "safety/limits: refused_as_a_whole",
-            "safety/limits: box_s_margin",
-            "safety/limits: leaves_the_reach",
-        ),
-    ),
-    "S5": Answer(
-        "the watchdog is kicked by the loop alone, while all guards are green",
-        "the set-point is the kick",
-        ("robot/ur_driver: watchdog_stops_the_arm", "safety/faults: fault_during_motion"),
-    ),
-    "S6": Answer(
-        "guards at each tick",
-        "safety/guards.py",
-        ("safety/guards: every_guard_has_a_case", "safety/guards: each_guard_trips_alone"),
-    ),
-    "S7": Answer(
-        "a guard stops the arm permanently",
-        "the process ends; nothing resumes",
-        ("session/session: stop_is_final", "robot/ur_driver: stop_returns_at_once_and_is_final"),
-    ),
-    "S8": Answer(
-        "a camera, this computer or the link dies",
-        "the fault matrix",
-        ("safety/faults: fault_during_motion",),
-    ),
-    "S9": Answer(
-        "processes of their own; every end of main is a stop",
-        "end-of-file on the orders, signals, atexit",
-        ("session/session: however_main_ends", "robot/control_process: signal_stops_the_arm"),
-    ),
-    "S10": Answer(
-        "pouring",
-        "the lip is the tool's centre; the way back is checked with the way there; a source is "
-        "turned back upright where the robot is well",
-        (
-            "robot/ur_driver: lip_becomes_the_tool_s_centre",
-            "motion/stir_paths: pour_turns_about_the_resting_lip",
-            "robot/control_process: turned_back_before_the_arm_stops",
-            "robot/control_process: not_turned_back_on_a_force",
-        ),
-    ),
-    "S11": Answer(
-        "a log of commands and of the reason of every stop",
-        "events.jsonl: began, done, stopped, with the path's hash",
-        ("robot/control_process: followed_recorded_and_logged", "session/session: is_the_reason"),
-    ),
+    # a log of commands and of the reason of every stop
+    "S11": (f"{CONTROL}followed_recorded_and_logged", f"{SESSION}is_the_reason"),
 }
-TESTS = Path(__file__).parents[1]
-DRIVER = TESTS.parents[1] / "hardware" / "robot" / "ur.py"
-
-
-@pytest.mark.parametrize("number", ANSWERS)
-def test_every_hazard_has_a_test(number):
-    for test in ANSWERS[number].tests:
-        file, _, words = test.partition(": ")
-        room, _, name = file.partition("/")
-        text = (TESTS / room / f"test_{name}.py").read_text(encoding="utf-8")
-        assert any(words in line for line in text.splitlines() if line.startswith("def test_"))
-
-
-def test_no_hazard_is_left_out():
-    assert list(ANSWERS) == [*map(str, range(1, 15)), *(f"S{k}" for k in range(1, 12))]
-
-
-@pytest.mark.parametrize(
-    "call",
-    [
-        *("getStepTime", "getActualJointPositionsHistory", "getJointTorques", "toolContact"),
-        *("getActualToolFlangePose", "getForwardKinematics", "setExternalForceTorque"),
-        *("stopL(", "stopJ(", "speedStop", "waitPeriod", "reconnect(", "reuploadScript"),
-        *("moveL(", "moveJ(", "movePath", "speedL(", "unlockProtectiveStop", "ft_raw_wrench"),
-    ],
+TESTS = Path(__file__).parents[2]
+SOURCE = TESTS.parent / "hardware" / "robot" / "ur.py"
+LYING = (
+    *("getStepTime", "getActualJointPositionsHistory", "getJointTorques", "toolContact"),
+    *("getActualToolFlangePose", "getForwardKinematics", "setExternalForceTorque"),
+    *("stopL(", "stopJ(", "speedStop", "waitPeriod", "reconnect(", "reuploadScript"),
+    *("moveL(", "moveJ(", "movePath", "speedL(", "unlockProtectiveStop", "ft_raw_wrench"),
 )
-def test_calls_that_lie_are_not_used(call):
-    code = [line for line in DRIVER.read_text().splitlines() if "#" not in line]
-    assert not any(f".{call}" in line for line in code)
+
+
+def test_every_hazard_has_its_tests():
+    assert list(ANSWERS) == [*map(str, range(1, 15)), *(f"S{k}" for k in range(1, 12))]
+    missing = []
+    for number, tests in ANSWERS.items():
+        for test in tests:
+            file, _, words = test.partition(": ")
+            room, _, name = file.rpartition("/")
+            text = (TESTS / room / f"test_{name}.py").read_text(encoding="utf-8")
+            lines = [line for line in text.splitlines() if line.startswith("def test_")]
+            if not any(words in line for line in lines):
+                missing.append((number, test))
+    assert not missing
+
+
+def test_calls_that_lie_are_not_used():
+    code = "\n".join(line for line in SOURCE.read_text().splitlines() if "#" not in line)
+    assert [call for call in LYING if f".{call}" in code] == []

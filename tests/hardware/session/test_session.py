@@ -9,20 +9,21 @@ from dataclasses import replace
 import numpy as np
 import psutil
 import pytest
+from bolfi_liquids.hardware import emulated
 from bolfi_liquids.hardware.errors import MotionRejected, RigError
 from bolfi_liquids.hardware.motion.stir_paths import insert, retract, stir
 from bolfi_liquids.hardware.recorder.events import read_events
-from bolfi_liquids.hardware.recorder.sample import SAMPLES
+from bolfi_liquids.hardware.recorder.samples import SAMPLES
 from bolfi_liquids.hardware.robot.ur import URController
 from bolfi_liquids.hardware.safety.preflight import failures
-from bolfi_liquids.hardware.session.confirmation import (
+from bolfi_liquids.hardware.session.session import Session, SessionStopped
+from bolfi_liquids.hardware.session.setup import (
     CONFIRMATION,
     Confirmation,
+    SessionSetup,
     confirm,
     describe,
 )
-from bolfi_liquids.hardware.session.session import Session, SessionStopped
-from bolfi_liquids.hardware.session.setup import SessionSetup
 from short_rig import short_rig
 from ur_controller.patience import PatientSetup
 from ur_controller.process import FOLDER, ControllerProcess
@@ -68,6 +69,24 @@ def kinds(directory, source):
     return [event["kind"] for event in read_events(directory) if event["source"] == source]
 
 
+@keeps_time
+def test_a_session_moves_an_emulated_arm_and_asks_nobody(tmp_path):
+    arm = emulated(RIG, PLAN[0].pose[0]).controller
+    with Session(SessionSetup(RIG, tmp_path / "whole", arm, armed=True, plan=PLAN)) as session:
+        assert failures(session.preflight()) == ""
+        for path in PLAN:
+            session.follow(path)
+        assert session.wait(timeout=30.0)
+        session.close()  # which waits until the arm rests
+    last = (tmp_path / "whole" / SAMPLES).read_text().splitlines()[-1].split(",")
+    assert np.array(last[3:6], float) == pytest.approx(PLAN[-1].pose[-1, :3], abs=1e-3)
+    with Session(SessionSetup(RIG, tmp_path / "killed", arm, armed=True, plan=PLAN)) as session:
+        begin(session)
+        os.kill(session._processes.control.process.pid, signal.SIGKILL)
+        with pytest.raises(SessionStopped, match="control process killed by SIGKILL"):
+            session.wait(timeout=5.0)
+
+
 @pytest.mark.slow
 @keeps_time
 def test_a_session_follows_paths_records_them_and_leaves_nothing_behind(emulator, tmp_path):
@@ -89,7 +108,7 @@ def test_a_session_follows_paths_records_them_and_leaves_nothing_behind(emulator
         start = time.monotonic()
     assert time.monotonic() - start < 1.5
     assert not any(lives(pid) for pid in pids)
-    assert emulator.admin.state().at_rest
+    assert emulator.admin.state().resting
     assert kinds(tmp_path, "control")[-5:] == ["began", "done", "began", "done", "left"]
     rows = (tmp_path / SAMPLES).read_text().splitlines()
     assert [int(row.split(",")[0]) for row in rows[1:]] == list(range(len(rows) - 1))
@@ -101,25 +120,31 @@ def test_a_session_follows_paths_records_them_and_leaves_nothing_behind(emulator
         session.follow(PLAN[0])
 
 
-def test_a_session_that_was_not_started_takes_no_orders_and_can_be_closed(tmp_path):
-    session = Session(SessionSetup(RIG, tmp_path / "new"))
+def test_a_session_that_was_not_started_takes_no_orders_and_starts_once(tmp_path):
+    """What was closed would start processes again that nothing ends."""
+    session = Session(SessionSetup(RIG, tmp_path / "new", plan=PLAN))
+    assert "array" not in repr(session.setup)
     with pytest.raises(SessionStopped, match="not been started"):
         session.follow(PLAN[0])
     session.stop("nothing to stop")
     assert not session.status().closed
     session.close()
     assert session.status().closed
-    assert not (tmp_path / "new").exists()
+    with pytest.raises(SessionStopped):
+        session.start()
+    assert session._processes is None and not list(tmp_path.iterdir())
 
 
-def test_a_confirmation_is_good_for_one_session(emulator, tmp_path):
-    setup = armed(emulator, tmp_path / "first").setup
+def test_a_confirmation_is_good_for_one_session(tmp_path):
+    arm = URController("127.0.0.8")
+    leave = confirm("plan", CONFIRMATION, arm.address)
+    setup = SessionSetup(RIG, tmp_path / "first", arm, armed=True, confirmation=leave)
     setup.take_confirmation()
-    with pytest.raises(RigError, match="for an earlier session"):
+    with pytest.raises(RigError, match="earlier session"):
         Session(setup).start()
-    with pytest.raises(RigError, match="for an earlier session"):
+    with pytest.raises(RigError, match="earlier session"):
         replace(setup, directory=tmp_path / "second")
-    assert emulator.admin.motions() == 0
+    assert not list(tmp_path.iterdir())
 
 
 @keeps_time
@@ -137,19 +162,19 @@ def test_a_session_is_a_dry_run_unless_it_is_armed_and_records_all_the_same(emul
 
 def test_nobody_is_armed_without_a_confirmation(tmp_path):
     other = URController("127.0.0.9")
-    with pytest.raises(RigError, match="armed without a confirmation"):
+    with pytest.raises(RigError, match="without a confirmation"):
         SessionSetup(RIG, tmp_path, other, armed=True)
-    with pytest.raises(RigError, match="armed without a confirmation"):
+    with pytest.raises(RigError, match="without a confirmation"):
         SessionSetup(RIG, tmp_path, other, armed=True, confirmation="yes")  # type: ignore[arg-type]
     leave = confirm("plan", CONFIRMATION, "127.0.0.8")
     with pytest.raises(RigError, match="is for 127.0.0.8, the controller is at 127.0.0.9"):
         SessionSetup(RIG, tmp_path, other, armed=True, confirmation=leave)
 
 
-@pytest.mark.parametrize("typed", ["", "y", "yes", CONFIRMATION.upper(), CONFIRMATION + "!"])
-def test_only_the_sentence_confirms(typed):
-    with pytest.raises(RigError, match=CONFIRMATION):
-        confirm("plan", typed, "127.0.0.8")
+def test_only_the_sentence_confirms():
+    for typed in ("", "y", "yes", CONFIRMATION.upper(), CONFIRMATION + "!"):
+        with pytest.raises(RigError):
+            confirm("plan", typed, "127.0.0.8")
     assert confirm("plan", f" {CONFIRMATION}\n", "127.0.0.8").plan == "plan"
     with pytest.raises(TypeError):
         Confirmation(object(), "plan", None)
@@ -186,9 +211,9 @@ def test_an_exception_stops_the_arm_and_is_the_reason(emulator, tmp_path):
     with pytest.raises(ZeroDivisionError):
         with armed(emulator, tmp_path) as session:
             begin(session)
-            assert not emulator.admin.state().at_rest
+            assert not emulator.admin.state().resting
             raise ZeroDivisionError("oh")
-    assert emulator.admin.state().at_rest
+    assert emulator.admin.state().resting
     (event,) = [event for event in read_events(tmp_path) if event["kind"] == "stopped"]
     assert "ZeroDivisionError in the main process: oh" in event["reason"]
 
@@ -213,7 +238,7 @@ def test_a_control_process_that_hangs_is_ended(emulator, tmp_path):
         os.kill(session._processes.control.process.pid, signal.SIGSTOP)
         with pytest.raises(SessionStopped, match="no sign of life of the control process"):
             session.wait(timeout=5.0)
-    assert emulator.admin.state().at_rest
+    assert emulator.admin.state().resting
 
 
 def test_no_controller_is_a_line_of_the_list(tmp_path):
@@ -233,7 +258,7 @@ from pathlib import Path
 from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.robot.ur import URController
-from bolfi_liquids.hardware.session.confirmation import CONFIRMATION, confirm
+from bolfi_liquids.hardware.session.setup import CONFIRMATION, confirm
 from bolfi_liquids.hardware.session.session import Session
 from short_rig import short_rig
 from ur_controller.patience import PatientSetup
@@ -266,10 +291,10 @@ def test_however_main_ends_the_arm_stops(emulator, tmp_path, way):
     command = [sys.executable, str(script), emulator.address, way, str(recording)]
     subprocess.run(command, timeout=60.0, stderr=subprocess.DEVNULL, check=False, env=FINDING)
     end = time.monotonic() + 10.0
-    while time.monotonic() < end and not emulator.admin.state().at_rest:
+    while time.monotonic() < end and not emulator.admin.state().resting:
         time.sleep(0.02)
     assert emulator.admin.motions() > 0
-    assert emulator.admin.state().at_rest
+    assert emulator.admin.state().resting
     assert "stopped" in kinds(recording, "control")
 
 
@@ -294,7 +319,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("delay", [0.0, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("delay", [0.0, 1.0])
 def test_ctrl_c_twice_leaves_no_process_behind_and_shows_no_child_s_inside(
     emulator, tmp_path, delay
 ):
@@ -315,16 +340,3 @@ def test_ctrl_c_twice_leaves_no_process_behind_and_shows_no_child_s_inside(
     while time.monotonic() < end and group_lives(main.pid):
         time.sleep(0.02)
     assert not group_lives(main.pid)
-
-
-def test_a_session_starts_once(tmp_path):
-    """What was closed would start processes again that nothing ends."""
-    session = Session(SessionSetup(RIG, tmp_path))
-    session.close()
-    with pytest.raises(SessionStopped):
-        session.start()
-    assert session._processes is None and not list(tmp_path.iterdir())
-
-
-def test_a_setup_is_shown_without_the_arrays_of_its_plan(tmp_path):
-    assert "array" not in repr(SessionSetup(RIG, tmp_path, plan=PLAN))

@@ -1,25 +1,16 @@
 """An emulator in this thread, on a stepped clock, and the calls of ur_rtde that our driver makes.
 
-They speak to the emulator's ports as the library does. What the library waits for steps the clock
-here, so that seconds of the arm last a fraction of them, and are the same each time whatever else
-this computer does.
+What the library waits for steps the clock here, so that seconds of the arm last a fraction of them,
+and are the same each time whatever else this computer does.
 """
 
-import socket
-import struct
-import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
-from typing import Any
 
 from stepped_clock import SteppedClock
 
-from . import wire
-from .controller import Options
-from .loop import ControllerServer
-from .network import RTDE, SCRIPT
-from .process import free_address
-from .program import (
+from .machine import (
     DONE,
     READY,
     SERVO_L,
@@ -30,41 +21,77 @@ from .program import (
     STOP_SCRIPT,
     TCP_OFFSET,
     WITHIN_LIMITS,
+    Controller,
+    Options,
+    Snapshot,
 )
 
-ANSWER_TIMEOUT = 10.0  # s of this computer's clock; the emulator answers in this thread
-
-REGISTER_OFFSET = 24  # of the control script's registers, as in ur_rtde
+FIRST = 24  # of the control script's registers, as in ur_rtde
 OVER = object()  # of a command of which no step is left
-SCRIPT_TEXT = f"def rtde_control():\n# int register offset\n{REGISTER_OFFSET}\nend\n"
-INPUT_FIELDS = [
-    f"input_int_register_{REGISTER_OFFSET}",
-    *(f"input_double_register_{REGISTER_OFFSET + i}" for i in range(18)),
-]
-OUTPUT_FIELDS = [
-    *(
-        "runtime_state",
-        f"output_int_register_{REGISTER_OFFSET}",
-        f"output_int_register_{REGISTER_OFFSET + 1}",
-    ),
-    *(f"output_double_register_{REGISTER_OFFSET + i}" for i in range(6)),
-]
+SCRIPT_TEXT = f"def rtde_control():\n# int register offset\n{FIRST}\nend\n"
 
 
-class SteppedController(ControllerServer):
-    """An emulator whose ticks a stepped clock makes."""
+class AtOnce:
+    """In place of the driver's thread, which has nothing to wait for here."""
+
+    def __init__(self, target: Callable[[], None], **_: object):
+        self.start = target
+
+    def join(self, _: float) -> None:
+        """Nothing is left to wait for."""
+
+
+class SteppedController:
+    """An emulator whose ticks a stepped clock makes, and its link to clients.
+
+    Attributes:
+        address: For messages.
+        controller: Behind the link.
+        late: Data packages come so much later [s].
+        published: The latest package that has come.
+    """
+
+    address = "127.0.0.1"
 
     def __init__(self, options: Options, clock: SteppedClock):
-        self.address = free_address()
-        self.clock = clock
-        self.clients: list[socket.socket] = []
-        super().__init__(self.address, options, clock)
-        clock.every(self.controller.dt, lambda: self.turn(clock.now()))
+        self.clock, self.controller = clock, Controller(options, clock)
+        self.published, self.late, self.clients = self.controller.snapshot, 0.0, []
+        self._on_the_way: deque[tuple[float, Snapshot]] = deque()
+        self._held: list[dict[str, float]] = []  # what clients sent to a frozen link
+        self._frozen_until = 0.0
+        clock.every(self.controller.dt, self._tick)
 
-    def close(self) -> None:
+    def freeze(self, seconds: float) -> None:
+        """Nothing comes or goes for a while, and the link looks sound."""
+        self._frozen_until = self.clock.now() + seconds
+
+    def drop(self) -> None:
+        """Close all connections."""
         for client in self.clients:
-            client.close()
-        super().close()
+            client.disconnect()
+
+    def reconnect(self) -> None:
+        """Open them again, as the library does by itself."""
+        for client in self.clients:
+            client.connected = True
+
+    def send(self, values: dict[str, float]) -> None:
+        """A client's package; on a frozen link it waits."""
+        if self.clock.now() < self._frozen_until:
+            self._held.append(values)
+        else:
+            self.controller.receive(values)
+
+    def _tick(self) -> None:
+        now = self.clock.now()
+        frozen = now < self._frozen_until
+        while self._held and not frozen:
+            self.controller.receive(self._held.pop(0))
+        self._on_the_way.append((now + self.late, self.controller.tick()))
+        if frozen:
+            self._on_the_way.clear()
+        while self._on_the_way and self._on_the_way[0][0] <= now:
+            self.published = self._on_the_way.popleft()[1]
 
 
 class _Client:
@@ -72,91 +99,49 @@ class _Client:
 
     emulator: SteppedController
 
-    def __init__(self, outputs: list[str], rate: float):
-        self._socket = socket.create_connection((self.emulator.address, RTDE))
-        self._socket.setblocking(False)
-        self.emulator.clients.append(self._socket)
-        self._inbox, self._open = bytearray(), True
-        self._latest: dict[str, Any] = {}
-        wanted = struct.pack(">d", rate) + ",".join(outputs).encode()
-        types = self.ask(wire.OUTPUTS, wanted)[1:].decode().split(",")
-        self._outputs = outputs, types, wire.layout(types)
-        self.ask(wire.START, b"")
+    def __init__(self):
+        self.connected, self._last = True, self.emulator.published
+        self.emulator.clients.append(self)
 
-    def ask(self, kind: int, payload: bytes) -> bytes:
-        self._socket.sendall(wire.pack(kind, payload))
-        end = time.monotonic() + ANSWER_TIMEOUT
-        while time.monotonic() < end:
-            self.emulator.network.poll(0.0)
-            for package in self._packages():
-                if package.type == kind:
-                    return package.payload
-        raise TimeoutError(f"no answer to a package of type {kind} in {ANSWER_TIMEOUT:g} s")
-
-    def value(self, name: str) -> Any:
-        """Of the latest package; it stays what it was once the link is lost."""
-        self.isConnected()
-        return self._latest[name]
+    @property
+    def latest(self) -> Snapshot:
+        """It stays what it was once the link is lost."""
+        if self.connected:
+            self._last = self.emulator.published
+        return self._last
 
     def isConnected(self) -> bool:
-        for package in self._packages():
-            self._keep(package)
-        return self._open
+        return self.connected
 
     def disconnect(self) -> None:
-        self._open = False
-        self._socket.close()
+        self._last, self.connected = self.latest, False
 
-    def _packages(self) -> Iterator[wire.Package]:
-        while self._open:
-            try:
-                data = self._socket.recv(65536)
-            except BlockingIOError:
-                break
-            except OSError:
-                data = b""
-            self._open = bool(data)
-            self._inbox += data
-        while (package := wire.take(self._inbox)) is not None:
-            yield package
 
-    def _keep(self, package: wire.Package) -> None:
-        names, types, layout = self._outputs
-        _, *flat = layout.unpack(package.payload)
-        for name, kind in zip(names, types, strict=True):
-            size = int(kind[6]) if kind.startswith("VECTOR") else 1
-            one, flat = flat[:size], flat[size:]
-            self._latest[name] = one if size > 1 else one[0]
+GETTERS: dict[str, Callable[[Snapshot], object]] = {
+    "getTimestamp": lambda s: s.time,
+    "getActualQ": lambda s: s.joints,
+    "getActualTCPPose": lambda s: s.pose,
+    "getActualTCPSpeed": lambda s: s.velocity,
+    "getActualTCPForce": lambda s: s.force,
+    "getRobotMode": lambda _: 7,
+    "getRuntimeState": lambda s: s.runtime_state,
+    "getSafetyStatusBits": lambda s: s.safety_bits,
+    "getSpeedScaling": lambda _: 1.0,
+    "getTargetSpeedFraction": lambda _: 1.0,
+    "getPayload": lambda s: s.payload,
+    "getPayloadCog": lambda s: s.payload_centre,
+}
 
 
 class _Receive(_Client):
     """In place of `RTDEReceiveInterface`."""
 
-    def __init__(self, _: str, rate: float, fields: list[str]):
-        super().__init__(fields, rate)
-        # the library waits for the first package, too
-        while "timestamp" not in self._latest:
-            self.emulator.clock.sleep(1.0 / rate)
-            self.isConnected()
+    def __init__(self, *_: object):
+        super().__init__()
 
     def __getattr__(self, name: str) -> Callable[[], object]:
-        return lambda: self.value(GETTERS[name])
-
-
-GETTERS = {
-    "getTimestamp": "timestamp",
-    "getActualQ": "actual_q",
-    "getActualTCPPose": "actual_TCP_pose",
-    "getActualTCPSpeed": "actual_TCP_speed",
-    "getActualTCPForce": "actual_TCP_force",
-    "getRobotMode": "robot_mode",
-    "getRuntimeState": "runtime_state",
-    "getSafetyStatusBits": "safety_status_bits",
-    "getSpeedScaling": "speed_scaling",
-    "getTargetSpeedFraction": "target_speed_fraction",
-    "getPayload": "payload",
-    "getPayloadCog": "payload_cog",
-}
+        getter = GETTERS[name]
+        return lambda: getter(self.latest)
 
 
 class _Control(_Client):
@@ -165,21 +150,13 @@ class _Control(_Client):
     FLAG_UPLOAD_SCRIPT, FLAG_NO_WAIT = 1, 8
 
     def __init__(self, _: str, rate: float, flag: int):
-        super().__init__(OUTPUT_FIELDS, rate)
+        super().__init__()
         self._period = 1.0 / rate
-        self._layout = wire.layout(["INT32"] + 18 * ["DOUBLE"])
-        answer = self.ask(wire.INPUTS, ",".join(INPUT_FIELDS).encode())
-        if b"IN_USE" in answer:
-            raise RuntimeError("registers already in use")
         self._later: list[Iterator[None]] = []  # commands that nobody waits for, one after another
         self._goes_on = False
         if flag == self.FLAG_UPLOAD_SCRIPT:
-            with socket.create_connection((self.emulator.address, SCRIPT)) as upload:
-                upload.sendall(SCRIPT_TEXT.encode())
-                self.emulator.clock.sleep(3 * self._period)
-
-    def __del__(self):
-        self.disconnect()
+            self.emulator.controller.load(SCRIPT_TEXT)
+            self.emulator.clock.sleep(3 * self._period)
 
     def setTcp(self, offset: list[float]) -> bool:
         return self._wait(SET_TCP, offset)
@@ -187,20 +164,19 @@ class _Control(_Client):
     def setPayload(self, mass: float, centre: list[float]) -> bool:
         return self._wait(SET_PAYLOAD, [mass, *centre])
 
-    def getTCPOffset(self) -> list[float]:
+    def getTCPOffset(self) -> tuple[float, ...]:
         self._wait(TCP_OFFSET, [])
-        return [self.value(f"output_double_register_{REGISTER_OFFSET + i}") for i in range(6)]
+        return self.latest.output_doubles[FIRST : FIRST + 6]
 
     def isPoseWithinSafetyLimits(self, pose: list[float]) -> bool:
         self._wait(WITHIN_LIMITS, pose)
-        return self.value(f"output_int_register_{REGISTER_OFFSET + 1}") == 1
+        return self.latest.output_ints[FIRST + 1] == 1
 
     def setWatchdog(self, frequency: float) -> bool:
         return self._wait(SET_WATCHDOG, [frequency])
 
     def servoL(self, pose: list[float], *numbers: float) -> bool:
-        speed, acceleration, period, lookahead, gain = numbers
-        self._send(SERVO_L, [*pose, speed, acceleration, period, lookahead, gain])
+        self._send(SERVO_L, [*pose, *numbers])
         return self._runs()
 
     def servoStop(self, deceleration: float) -> None:
@@ -214,7 +190,7 @@ class _Control(_Client):
         self._later.append(self._ended())
 
     def _runs(self) -> bool:
-        return self.isConnected() and self.value("runtime_state") == 2
+        return self.connected and self.latest.runtime_state == 2
 
     def _wait(self, command: int, numbers: list[float]) -> bool:
         for _ in self._carried_out(command, numbers):
@@ -226,7 +202,7 @@ class _Control(_Client):
         for sent, answer in ((command, DONE), (0, READY)):
             self._send(sent, numbers)
             yield
-            while self._runs() and self.value(f"output_int_register_{REGISTER_OFFSET}") != answer:
+            while self._runs() and self.latest.output_ints[FIRST] != answer:
                 yield
 
     def _ended(self) -> Iterator[None]:
@@ -240,9 +216,10 @@ class _Control(_Client):
             self._later.pop(0)
 
     def _send(self, command: int, numbers: list[float]) -> None:
-        values = [*numbers, *(18 - len(numbers)) * [0.0]]
-        if self._open:
-            self._socket.sendall(wire.pack(wire.DATA, self._layout.pack(1, command, *values)))
+        if self.connected:
+            names = (f"input_double_register_{FIRST + i}" for i in range(len(numbers)))
+            values = dict(zip(names, numbers, strict=True))
+            self.emulator.send({f"input_int_register_{FIRST}": command} | values)
 
 
 def library(emulator: SteppedController) -> SimpleNamespace:

@@ -4,24 +4,16 @@ import dataclasses
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware.cameras import RenderedCamera, Timing
 from bolfi_liquids.hardware.motion import Trajectory, star
-from bolfi_liquids.hardware.rendering import Look, prepare
 from bolfi_liquids.hardware.vision import (
     DelayError,
-    FrameMeasurement,
-    FrameMeter,
     FrameSeries,
-    MeasuredView,
     ViewLines,
     fit_delay,
-    frame_series,
-    join,
 )
-from rendered_scenes import MovingWorld, rehearsal_camera, rehearsal_scene, stick_view
+from rendered_scenes import rehearsal_camera, rehearsal_scene
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
-from stepped_clock import SteppedClock
 
 cv2 = pytest.importorskip("cv2")
 
@@ -54,8 +46,7 @@ def marker_series(camera, noise: float, seed: int = 0, delay: float = DELAY) -> 
     return FrameSeries(exposed + delay, pixels, ViewLines(*[nothing] * 4, flags))
 
 
-@pytest.mark.parametrize("rate", [125.0, 30.0])
-@pytest.mark.parametrize("delay", [0.0, 0.03, 0.4, -0.3])
+@pytest.mark.parametrize(("rate", "delay"), [(125.0, 0.03), (30.0, 0.4), (125.0, -0.3)])
 def test_the_delay_is_found(rate, delay):
     camera = rehearsal_camera("xz")
     series = marker_series(camera, noise=0.05, delay=delay)
@@ -112,59 +103,3 @@ def test_pictures_that_tell_nothing_about_time_are_refused():
     lost = Trajectory(robot.time, np.full_like(robot.position, np.nan))
     with pytest.raises(DelayError, match="0 finite samples"):
         fit_delay(series, lost, camera, MARKER)
-
-
-def inclination_of(time):
-    return np.radians([8 * np.sin(6.9 * time) + 3 * np.sin(2.3 * time), 7 * np.sin(8.1 * time + 1)])
-
-
-def filmed(view: str, timing: Timing, frames: int):
-    """Measurements of a rendered stir; robot's clock minus the computer's is START - 50."""
-    world = MovingWorld(pivot, inclination_of, offset=START - 50.0)
-    scene, camera = rehearsal_scene(view), rehearsal_camera(view)
-    rendered = RenderedCamera(
-        prepare(scene, camera, Look(), seed=timing.seed),
-        world,
-        timing,
-        clock=SteppedClock(50.0),
-    )
-    meter, found = FrameMeter(stick_view(scene, camera)), []
-    for _ in range(frames):
-        frame = rendered.read()
-        assert frame is not None
-        found.append(meter.measure(frame))
-    columns = dict(zip(FrameMeasurement._fields, np.array(found).T, strict=True))
-    return frame_series(columns), camera, scene.marker_offset
-
-
-def joined_from_pictures(frames: int):
-    """Joined inclination, times, and errors of both delays [s]."""
-    timings = {
-        "xz": Timing(seed=1),
-        "yz": Timing(seed=2, rate=29.97, latency=0.08),
-    }
-    robot, views, late = samples(125.0), [], []
-    for name, timing in timings.items():
-        series, camera, marker = filmed(name, timing, frames)
-        series = series._replace(stamp=series.stamp + START - 50.0)
-        delay = fit_delay(series, robot, camera, marker).delay
-        late.append(delay - timing.latency)
-        views.append(MeasuredView(series, delay, camera))
-    times = START + np.arange(0.2, frames / 30 - 0.2, 1 / 30)
-    return join(views[0], views[1], times), times, np.array(late)
-
-
-def check_joined(joined, times, late) -> None:
-    errors = joined.angle - np.array([inclination_of(time) for time in times])
-    good = joined.flags == 0
-    np.testing.assert_array_equal(np.isfinite(errors).all(axis=1), good)
-    assert good.mean() > 0.75
-    assert np.degrees(np.sqrt(np.mean(errors[good] ** 2))) < 0.15
-    assert np.degrees(np.abs(errors[good]).max()) < 3.0
-    assert 0.7 < np.sqrt(np.mean((errors[good] / joined.error[good]) ** 2)) < 1.4
-    assert np.abs(late).max() < 3e-4
-
-
-@pytest.mark.slow
-def test_a_stir_is_recovered_from_its_pictures():
-    check_joined(*joined_from_pictures(200))

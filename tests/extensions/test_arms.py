@@ -1,15 +1,27 @@
-"""What every arm must do: the emulated one, and URArm by a controller in this thread."""
+"""What every arm must do: those of the package, the example's, and one of your own.
+
+`pytest tests/extensions --arm your_module:YourController` adds the last to each test. It is called
+with the joints at the start [rad], and a clock with `now` and `sleep` by which the arm must go.
+"""
+
+import importlib
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware import bundled_rig, emulated
+from bolfi_liquids.hardware import MotionRejected, bundled_rig, emulated
 from bolfi_liquids.hardware.arm import LOOKAHEAD, WATCHDOG_PERIOD, LinkLost
-from bolfi_liquids.hardware.errors import MotionRejected
-from bolfi_liquids.hardware.motion.cup_frame import cup_frame
-from bolfi_liquids.hardware.motion.stir_paths import stir
-from bolfi_liquids.hardware.robot.ur import URController
+from bolfi_liquids.hardware.motion import stir
+from bolfi_liquids.hardware.motion.poses import cup_frame
+from bolfi_liquids.hardware.robot import ur
 from bolfi_liquids.hardware.safety.guards import NORMAL, PLAYING, RUNNING_MODE
-from stepped_clock import SteppedClock
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "hardware")]
+from delayed_arm import DelayedArm  # noqa: E402
+from stepped_clock import SteppedClock  # noqa: E402
+from ur_controller.machine import Options  # noqa: E402
+from ur_controller.stepped import AtOnce, SteppedController, library  # noqa: E402
 
 RIG = bundled_rig()
 STIR = stir(RIG)
@@ -18,20 +30,35 @@ PERIOD = 1.0 / RIG.robot.rate
 MOVING = int(np.flatnonzero(np.linalg.norm(PATH[:, :3] - PATH[0, :3], axis=1) > 1e-3)[0])
 
 
+def pytest_generate_tests(metafunc):
+    if "controller" in metafunc.fixturenames:
+        own = metafunc.config.getoption("arm", default="")
+        names = ["emulated", "ur", "example", *([own] if own else [])]
+        metafunc.parametrize("controller", names, indirect=True)
+
+
 @pytest.fixture
 def clock():
     return SteppedClock()
 
 
-@pytest.fixture(params=["emulated", "ur"])
-def controller(request, clock):
+@pytest.fixture
+def controller(request, clock, monkeypatch):
     """Opens an arm at rest where the stir begins."""
     mine = emulated(RIG, STIR.pose[0]).controller._replace(clock=clock, begun=clock.now())
     if request.param == "emulated":
         return mine
-    request.getfixturevalue("at_once")
-    step = request.getfixturevalue("step_emulator")
-    return URController(step(clock, joints=mine.joints, tcp=RIG.robot.stirring_tcp).address)
+    if request.param == "ur":
+        options = Options(joints=mine.joints, tcp=RIG.robot.stirring_tcp)
+        emulator = SteppedController(options, clock)
+        for module in ("rtde_receive", "rtde_control"):
+            monkeypatch.setitem(sys.modules, module, library(emulator))
+        monkeypatch.setattr(ur, "Thread", AtOnce)
+        return ur.URController(emulator.address)
+    if request.param == "example":
+        return DelayedArm(mine.joints, clock)
+    module, _, name = request.param.partition(":")
+    return getattr(importlib.import_module(module), name)(mine.joints, clock)
 
 
 @pytest.fixture
@@ -91,20 +118,17 @@ def test_set_points_are_followed_with_the_lag_that_was_told(follower, clock):
     assert lagging < 2e-3 < 5e-3 < np.linalg.norm(PATH[last, :3] - here)
 
 
-@pytest.mark.parametrize("wrong", [np.nan, 0.06, 0.002])
-def test_a_set_point_that_breaks_a_limit_moves_nothing(follower, clock, wrong):
+def test_a_set_point_that_breaks_a_limit_moves_nothing(follower, clock):
+    with pytest.raises(MotionRejected):  # the first must be where the arm is
+        follower.command(PATH[0] + [0.003, 0, 0, 0, 0, 0])
     follow(follower, clock, PATH[:5])
-    with pytest.raises(MotionRejected):
-        follower.command(PATH[5] + [wrong, 0, 0, 0, 0, 0])
+    for wrong in (np.nan, 0.06, 0.002):
+        with pytest.raises(MotionRejected):
+            follower.command(PATH[5] + [wrong, 0, 0, 0, 0, 0])
     clock.sleep(0.5)
     assert follower.read().pose == pytest.approx(PATH[5], abs=1e-6)
     # the next is held against the last that was taken, not against what was refused
     follower.command(PATH[5])
-
-
-def test_the_first_set_point_must_be_where_the_arm_is(follower):
-    with pytest.raises(MotionRejected, match="a step of"):
-        follower.command(PATH[0] + [0.003, 0, 0, 0, 0, 0])
 
 
 def test_without_set_points_the_watchdog_stops_the_arm_for_good(follower, clock):

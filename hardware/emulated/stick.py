@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..motion.poses import Numbers
-from .stick_motion import StickMotion
 
 AHEAD = 0.1  # s of the table, in which one tick of the arm is looked for
 PACE = 0.02  # m/s; strokes are faster than that nearly everywhere
@@ -23,6 +22,41 @@ FADE = 0.5  # s, in which a stick that has left the path comes to hang straight 
 RECOVERY = 0.05  # s of going on, in which what was waited for is undone to 1/e
 AT_REST = 4e-4  # m from the end of the path, in which its last rest has begun
 HEADING = 0.3  # s of the way that tells a direction
+
+
+class StickMotion(NamedTuple):
+    """A stir as a table, in the cup's frame.
+
+    Attributes:
+        time: From its start [s], shape (T,), increasing.
+        pivot: Position of the stick's upper end [m], shape (T, 3).
+        inclination: From the downward vertical in the frame's xz and yz planes [rad], shape (T, 2),
+            positive with the tip towards +x and +y.
+    """
+
+    time: np.ndarray
+    pivot: np.ndarray
+    inclination: np.ndarray
+
+
+def checked(motion: StickMotion) -> StickMotion:
+    """The motion as it is.
+
+    Raises:
+        ValueError: Shapes do not agree, a number is not finite, or times do not rise.
+    """
+    size, parts = len(motion.time), motion._asdict()
+    shapes = tuple(np.shape(part) for part in motion)
+    fine = size > 1 and shapes == ((size,), (size, 3), (size, 2))
+    faults = {f"shapes {shapes}; give (T,), (T, 3) and (T, 2) of at least two rows": not fine}
+    faults |= {
+        f"a {name} that is not finite; give numbers only": not np.isfinite(values).all()
+        for name, values in parts.items()
+    }
+    faults["times that do not rise; sort its rows"] = not (np.diff(motion.time) > 0.0).all()
+    for fault in (what for what, found in faults.items() if found):
+        raise ValueError(f"a stick's motion has {fault}")
+    return motion
 
 
 class Replay(NamedTuple):

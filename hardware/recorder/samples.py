@@ -1,22 +1,60 @@
-"""The recorder: a process that does nothing but write down the robot's samples."""
+"""samples.csv: what is recorded of the robot at each tick, and the process that writes it down."""
 
 from collections.abc import Iterator
-from contextlib import closing
 from functools import partial
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
+from typing import NamedTuple
 
 from ..board import Board, Row, Who, host_time
 from ..csv_file import CsvAppender
-from ..signals import leave_signals_to_main
-from .disk import Disk, told_if_fails
-from .events import EventLog
-from .rate import counted, no_rate
-from .sample import SAMPLES, Sample
+from ..process import leave_signals_to_main
+from .events import Disk, writing
 
+SAMPLES = "samples.csv"
 HEARTBEAT = 0.04  # [s], at the longest, from one sign of life to the next
 # [s]; how long the arm is followed after main has gone: a source of liquid is turned back first
 LAST_SAMPLES = 5.0
+
+
+class Sample(NamedTuple):
+    """The robot at one tick of the motion loop.
+
+    Attributes:
+        index: Of the tick, without gaps.
+        time: The controller's clock [s].
+        host: The host's clock when it was read [s].
+        x: Tool's centre in the cup's frame [m], as are `y` and `z`.
+        rx: Its rotation vector in the base frame [rad], as are `ry` and `rz`.
+        target_x: Where it was told to be [m]; NaN while nothing is commanded.
+        fx: Force on the tool in the base frame [N], as are `fy` and `fz`.
+        speed_scaling: The controller's, 1 at full speed.
+        safety_bits: The controller's safety status.
+        runtime_state: 2 while its program runs.
+        stirring: 1 while the path belongs to the stir, 0 on the way there and back.
+        late: By which the tick came late [s].
+    """
+
+    index: int  # pyright: ignore[reportIncompatibleMethodOverride]
+    time: float
+    host: float
+    x: float
+    y: float
+    z: float
+    rx: float
+    ry: float
+    rz: float
+    target_x: float
+    target_y: float
+    target_z: float
+    fx: float
+    fy: float
+    fz: float
+    speed_scaling: float
+    safety_bits: int
+    runtime_state: int
+    stirring: int
+    late: float
 
 
 def run_recorder(board: Board, samples: Connection, main: Connection, directory: Path) -> None:
@@ -35,20 +73,19 @@ def run_recorder(board: Board, samples: Connection, main: Connection, directory:
         OSError: Not even an event can be written at the start.
     """
     leave_signals_to_main()
-    with closing(EventLog(directory, "recorder")) as log, told_if_fails(disk := Disk(log)):
+    with writing(directory, "recorder") as disk:
         table = disk.write(SAMPLES, lambda: CsvAppender(directory / SAMPLES, Sample._fields))
-        rate = no_rate(host_time())
+        begun, count = host_time(), 0
         for rows in _arriving(samples, main, disk):
             if table is not None and rows:
                 disk.write(SAMPLES, partial(table.append, rows))
-            now = host_time()
-            rate = counted(rate, len(rows), now)
-            row = Row(now, disk.trouble, rate.total, rate.rate, worst=disk.slowest)
-            board.write(Who.RECORDER, row)
+            now, count = host_time(), count + len(rows)
+            rate = count / (now - begun)
+            board.write(Who.RECORDER, Row(now, disk.trouble, count, rate, worst=disk.slowest))
         if table is not None:
             disk.write(SAMPLES, table.sync)
             table.close()
-        disk.tell("left", rows=rate.total, slowest_write=disk.slowest)
+        disk.tell("left", rows=count, slowest_write=disk.slowest)
 
 
 def _arriving(samples: Connection, main: Connection, disk: Disk) -> Iterator[list[Sample]]:
