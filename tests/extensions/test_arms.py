@@ -4,7 +4,6 @@
 with the joints at the start [rad], and a clock with `now` and `sleep` by which the arm must go.
 """
 
-import importlib
 import sys
 from pathlib import Path
 
@@ -17,8 +16,10 @@ from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.robot import ur
 from bolfi_liquids.hardware.safety.guards import NORMAL, PLAYING, RUNNING_MODE
 
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "hardware")]
-from delayed_arm import DelayedArm  # noqa: E402
+from .delayed_arm import DelayedArm
+from .named import named
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "hardware"))
 from stepped_clock import SteppedClock  # noqa: E402
 from ur_controller.machine import Options  # noqa: E402
 from ur_controller.stepped import AtOnce, SteppedController, library  # noqa: E402
@@ -57,8 +58,7 @@ def controller(request, clock, monkeypatch):
         return ur.URController(emulator.address)
     if request.param == "example":
         return DelayedArm(mine.joints, clock)
-    module, _, name = request.param.partition(":")
-    return getattr(importlib.import_module(module), name)(mine.joints, clock)
+    return named(request.param)(mine.joints, clock)
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 `pytest tests/extensions --camera your_module:YourCamera` adds the last to each test.
 """
 
-import importlib
 import pickle
 import sys
 import time
@@ -23,6 +22,8 @@ from bolfi_liquids.hardware.cameras import (
 )
 from bolfi_liquids.hardware.rendering import Look, SharedWorld, WorldState, prepare
 from bolfi_liquids.hardware.vision.stick_view import camera_model, scene
+
+from .named import named
 
 cv2 = pytest.importorskip("cv2")
 
@@ -72,8 +73,7 @@ def camera(request, tmp_path):
     elif name == "example":
         opened = open_camera(SECTION.model_copy(update={"driver": EXAMPLE}))
     else:
-        module, _, kind = name.partition(":")
-        opened = getattr(importlib.import_module(module), kind)(SECTION)
+        opened = named(name)(SECTION)
     yield opened, name
     opened.close()
 

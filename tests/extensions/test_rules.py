@@ -13,7 +13,7 @@ from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
 
 from bolfi_liquids import inference
 
-from .loading import beside, named
+from .named import named
 
 KEY, OTHER = jax.random.key(0), jax.random.key(1)
 PRIOR = inference.Prior({"a": dist.Uniform(0.0, 1.0), "b": dist.Uniform(0.0, 1.0)})
@@ -30,9 +30,7 @@ def pytest_generate_tests(metafunc):
 def rule(request):
     if request.param in RULES:
         return RULES[request.param]()
-    return (
-        beside("least_known", "LeastKnown") if request.param == "example" else named(request.param)
-    )()
+    return (LeastKnown if request.param == "example" else named(request.param))()
 
 
 @pytest.fixture(scope="module")

@@ -3,10 +3,6 @@
 `pytest tests/extensions --family your_module:YourFamily` adds the last to each test.
 """
 
-import importlib
-import importlib.util
-from pathlib import Path
-
 import jax
 import numpy as np
 import numpyro.distributions as dist
@@ -19,6 +15,9 @@ from bolfi_liquids.inference.surrogates.families import FAMILIES
 from bolfi_liquids.inference.surrogates.processes import OfProcesses
 
 from bolfi_liquids import inference
+
+from .named import named
+from .quadratic_surface import QuadraticSurface
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore::bolfi_liquids.inference.EmulatorWarning",
@@ -41,15 +40,6 @@ def simulate(theta, seeds):
 OBSERVED = simulate({"slope": np.array([0.3]), "offset": np.array([0.6])}, [12345])[0]
 
 
-def example():
-    path = Path(__file__).with_name("quadratic_surface.py")
-    module = importlib.util.module_from_spec(
-        spec := importlib.util.spec_from_file_location(path.stem, path)
-    )
-    spec.loader.exec_module(module)
-    return module.QuadraticSurface()
-
-
 def pytest_generate_tests(metafunc):
     if "family" in metafunc.fixturenames:
         own = metafunc.config.getoption("family", default="")
@@ -62,9 +52,8 @@ def family(request):
     if request.param in FAMILIES:
         return FAMILIES[request.param]()
     if request.param == "example":
-        return example()
-    module, _, name = request.param.partition(":")
-    return getattr(importlib.import_module(module), name)()
+        return QuadraticSurface()
+    return named(request.param)()
 
 
 @pytest.fixture(scope="module")
@@ -210,7 +199,7 @@ def test_a_surrogate_keeps_its_protocol(learned, subtests):
 
 
 def test_a_surrogate_that_ignores_pending_points_is_noticed():
-    learned = fitted(example()).learned
+    learned = fitted(QuadraticSurface()).learned
 
     class Stubborn(type(learned)):
         def fantasize(self, u):
@@ -253,12 +242,12 @@ def test_what_is_no_family_is_refused_before_it_learns():
 
 def test_what_is_no_surrogate_is_refused_with_what_is_missing():
     """Where it searches and where it fits, of a class derived from `Surrogate` or not."""
-    found = fitted(example()).learned
+    found = fitted(QuadraticSurface()).learned
 
     class Unfinished(Surrogate):
         u, best, predict = found.u, found.best, found.predict
 
-    class Odd(type(example())):
+    class Odd(type(QuadraticSurface())):
         def learn(self, data, key):
             return returned
 
@@ -271,7 +260,7 @@ def test_what_is_no_surrogate_is_refused_with_what_is_missing():
 
 
 def test_a_family_cannot_change_the_signals_that_it_measures():
-    class Writing(type(example())):
+    class Writing(type(QuadraticSurface())):
         def measure(self, observed, signals):
             for signal in signals:
                 signal[:] = 0.0
@@ -296,7 +285,7 @@ def test_a_fit_rests_on_it(fit, family):
 
 @pytest.mark.slow
 def test_the_example_finds_the_line_and_nuts_follows_it():
-    options = {"budget": 12, "surrogate": example(), "progress": False}
+    options = {"budget": 12, "surrogate": QuadraticSurface(), "progress": False}
     drawn = inference.fit(simulate, PRIOR, OBSERVED, **options).sample(draws=200, warmup=200)
     for name, truth in {"slope": 0.3, "offset": 0.6}.items():
         values = drawn["posterior"][name]
