@@ -31,7 +31,7 @@ from ..inputs.settings import (
     Surrogate,
 )
 from ..progress import progress_bar
-from ..run.provenance import versions
+from ..run.results import versions
 from ..run.run import SIMULATIONS, Run
 from ..seeds import Phase, generator, simulation_seeds
 from ..simulators import StirSimulator, stir_simulator

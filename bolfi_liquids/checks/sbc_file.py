@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..drawing import new_figure, styled, write_figure
-from ..run.result_file import write_result
+from ..run.results import write_result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -134,7 +134,7 @@ def _find(
     }
     sources = Sources(_stirs(calibration, inputs, clean, how | {"report": report}))
     if inputs.table is not None:
-        how["report"] = lambda phase, n: report(f"pours, {phase}", n)
+        how["report"] = lambda phase, *counts: report(f"pours, {phase}", *counts)
         pours = _pours(calibration.prior, sources.stirs, inputs, inputs.table, how)
         sources = Sources(sources.stirs, pours)
     return sources, sum(one.simulations for one in clean)

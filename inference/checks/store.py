@@ -23,6 +23,7 @@ CREATE TABLE IF NOT EXISTS replicate (
     error     TEXT
 );
 """
+MOST_SHOWN = 40  # letters of a setting in a message
 ARRAYS = ("truth", "observed", "draws", "log_density")
 
 
@@ -111,11 +112,21 @@ def _from_row(row: tuple) -> Replicate:
 def _difference(path: str, stored: Mapping[str, str], settings: Mapping[str, str]) -> str:
     """Why a store is refused."""
     unlike = [
-        f"{name}: stored {json.dumps(stored.get(name))}, now {json.dumps(settings.get(name))}"
+        name
         for name in sorted(set(stored) | set(settings))
         if stored.get(name) != settings.get(name)
     ]
-    return (
-        f"{path} holds replicates made with other settings "
-        f"({'; '.join(unlike)}); restore these, or choose another file"
+    told = "; ".join(
+        f"{name} was {_start(stored.get(name))} and is {_start(settings.get(name))}"
+        for name in unlike
     )
+    return (
+        f"{path} holds replicates made with other settings ({told}); restore these, or choose "
+        "another file"
+    )
+
+
+def _start(value: str | None) -> str:
+    """A setting as a message shows it: representations of pipelines fill pages."""
+    text = json.dumps(value)
+    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."

@@ -41,7 +41,8 @@ def own_residual(
 
     Args:
         compute: Where runs are made and kept.
-        report: Called with the phase and the number of simulations finished in it.
+        report: Called with the phase, the number of simulations finished in it since the last
+            call, and their number in all.
         start: Runs all over the prior, before those where the model fits best.
 
     Raises:

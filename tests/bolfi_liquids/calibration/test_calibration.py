@@ -143,7 +143,7 @@ def test_default_prior_covers_water_to_gel():
     np.testing.assert_array_equal(default_prior().contains(theta), [False, True, True, False])
 
 
-def test_a_run_that_was_not_finished_says_how_to_go_on(calibration, tmp_path):
+def test_a_run_that_was_not_finished_sayshow_to_go_on(calibration, tmp_path):
     (tmp_path / "run.toml").write_bytes((calibration.path / "run.toml").read_bytes())
     with pytest.raises(ValueError, match="not finished.*--resume"):
         bl.Calibration.open(tmp_path)

@@ -217,7 +217,7 @@ def test_a_seed_out_of_range_is_refused_before_anything_is_written(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_interruption_says_how_to_go_on(monkeypatch, tmp_path):
+def test_interruption_sayshow_to_go_on(monkeypatch, tmp_path):
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
@@ -246,7 +246,7 @@ main()
 """
 
 
-def test_a_command_that_is_terminated_says_how_to_go_on(short_recording, tmp_path):
+def test_a_command_that_is_terminated_sayshow_to_go_on(short_recording, tmp_path):
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "run.toml").touch()
     command = ["calibrate", str(short_recording), "--out", str(tmp_path / "run")]

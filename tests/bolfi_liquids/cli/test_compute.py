@@ -1,6 +1,5 @@
 """Options that say where a command simulates, and groups of options."""
 
-from dataclasses import dataclass
 from typing import Annotated
 
 import pytest
@@ -9,8 +8,8 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from bolfi_liquids.cli.app import app
-from bolfi_liquids.cli.compute import ComputeOptions
-from bolfi_liquids.cli.grouped import grouped
+from bolfi_liquids.cli.options import ComputeOptions, grouped
+from bolfi_liquids.inputs.settings import checked, helped
 
 ELSEWHERE = {"import", "guide", "record", "trim"}
 """Commands that simulate nothing, or in real time beside an arm."""
@@ -50,10 +49,10 @@ def test_two_places_at_once_are_refused():
             pass
 
 
-@dataclass(frozen=True)
+@checked()
 class Size:
-    width: Annotated[int, typer.Option(help="In cm.")] = 3
-    height: Annotated[int | None, typer.Option(help="In cm.")] = None
+    width: Annotated[int, helped("In cm.")] = 3
+    height: Annotated[int | None, helped("In cm.")] = None
 
 
 def test_a_group_becomes_options_and_arrives_whole():

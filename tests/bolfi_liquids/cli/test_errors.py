@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 import bolfi_liquids as bl
 from bolfi_liquids.cli.app import app
-from bolfi_liquids.cli.errors import _how_to_go_on
+from bolfi_liquids.cli.errors import how_to_go_on
 from bolfi_liquids.errors import Argument, InputError
 
 
@@ -23,21 +23,21 @@ def test_it_says_the_same_in_another_process():
 def test_who_interrupts_is_told_to_resume_only_what_has_begun(tmp_path, monkeypatch, out):
     monkeypatch.chdir(tmp_path)
     typed = ["calibrate", "my stir.nc", *out]
-    told = _how_to_go_on(typed)
+    told = how_to_go_on(typed)
     assert "--resume" not in told and "'my stir.nc'" in told
     (tmp_path / "run").mkdir()
-    assert "--resume" not in _how_to_go_on(typed)
+    assert "--resume" not in how_to_go_on(typed)
     (tmp_path / "run" / "run.toml").touch()
-    assert _how_to_go_on(typed).endswith(" --resume")
-    assert _how_to_go_on([*typed, "--resume"]).count("--resume") == 1
-    assert "--resume" not in _how_to_go_on(["pour", "run"])
+    assert how_to_go_on(typed).endswith(" --resume")
+    assert how_to_go_on([*typed, "--resume"]).count("--resume") == 1
+    assert "--resume" not in how_to_go_on(["pour", "run"])
 
 
 @pytest.mark.parametrize("out", [[], ["--out"], ["--out", "--budget"], ["--out", 300 * "n"]])
 def test_who_interrupts_without_a_place_is_told_to_begin_again(tmp_path, monkeypatch, out):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "run.toml").touch()  # of no run that was named
-    assert "begin again" in _how_to_go_on(["calibrate", "stir.nc", *out])
+    assert "begin again" in how_to_go_on(["calibrate", "stir.nc", *out])
 
 
 @pytest.mark.parametrize(

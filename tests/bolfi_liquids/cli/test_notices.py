@@ -2,7 +2,7 @@
 
 import logging
 
-from bolfi_liquids.cli.notices import PACKAGE, print_notices
+from bolfi_liquids.cli.errors import PACKAGE, print_notices
 
 
 def test_notices_are_printed_once_however_often_it_is_asked(capsys):

@@ -11,7 +11,7 @@ from bolfi_liquids.criticism.pours import as_prior
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.run.recordings import kept_recordings
+from bolfi_liquids.run.run import Run
 
 
 @pytest.mark.slow
@@ -42,7 +42,7 @@ def test_a_changed_copy_is_refused(calibration, tmp_path):
     (folder / kept.path.name).write_bytes(kept.path.read_bytes())
     record = {**calibration.record, "inputs": {"sha256": ["another"]}}
     with pytest.raises(InputError, match="not the recording that this run was calibrated on"):
-        kept_recordings(tmp_path, record)
+        _ = Run(tmp_path, record).recordings
 
 
 @pytest.mark.parametrize(

@@ -137,7 +137,7 @@ def test_refused_commands(told, tmp_path, command):
 
 
 def test_directories_that_cannot_be_worked_in(told, tmp_path):
-    from bolfi_liquids.run.lock import alone_in
+    from bolfi_liquids.run.run import alone_in
 
     assert told("calibrate stir.nc --out=") in QUOTED
     (tmp_path / "runs" / "mine").mkdir(parents=True)
@@ -148,10 +148,10 @@ def test_directories_that_cannot_be_worked_in(told, tmp_path):
 
 
 def test_a_full_disk():
-    from bolfi_liquids.cli.errors import _explained
+    from bolfi_liquids.cli.errors import explained
 
     full = OSError(errno.ENOSPC, "", "runs/mine/simulations.sqlite")
-    assert f"error: {_explained(full)}" in QUOTED
+    assert f"error: {explained(full)}" in QUOTED
 
 
 def test_missing_and_damaged_files(told, tmp_path):
@@ -206,6 +206,8 @@ def test_runs_that_cannot_go_on(told, run, calibration):
     (run / "posterior.nc").unlink()
     assert told("report runs/mine").replace("1-short.nc", "1-stir.nc") in QUOTED
     (run / "run.toml").unlink()
+    assert told("report runs/mine").replace("1-short.nc", "1-stir.nc") in QUOTED
+    shutil.rmtree(run / "recordings")
     assert told("report runs/mine") in QUOTED
     assert told("calibrate stir.nc --out runs/mine") in QUOTED
 

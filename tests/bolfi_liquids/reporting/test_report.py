@@ -23,7 +23,7 @@ from bolfi_liquids.reporting import report
 from bolfi_liquids.reporting.facts import calibration_facts, criticism_facts, fit_facts, pour_facts
 from bolfi_liquids.reporting.films import films_of
 from bolfi_liquids.reporting.prose import prose
-from bolfi_liquids.run.result_file import _parsed
+from bolfi_liquids.run.results import _parsed
 from bolfi_liquids.run.run import Run
 
 FIGURES = {

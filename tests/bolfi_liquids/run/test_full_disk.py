@@ -18,12 +18,11 @@ from xarray import Dataset, DataTree
 
 import bolfi_liquids as bl
 from bolfi_liquids import inference
-from bolfi_liquids.cli.errors import _explained
+from bolfi_liquids.cli.errors import explained
 from bolfi_liquids.drawing import new_figure, write_figure
 from bolfi_liquids.files import disk_errno
-from bolfi_liquids.run.result_file import write_result
+from bolfi_liquids.run.results import write_result, write_summary
 from bolfi_liquids.run.run import Run
-from bolfi_liquids.run.summary import write_summary
 
 
 @contextmanager
@@ -92,7 +91,7 @@ def test_what_cannot_be_written_whole_is_named_and_left_out(tmp_path, name):
     with pytest.raises(OSError) as refused:
         WRITES[name](tmp_path)
     assert refused.value.filename == str(tmp_path / name)
-    line = _explained(refused.value)
+    line = explained(refused.value)
     assert "\n" not in line
     assert line.startswith(f"{tmp_path / name}: ")
     assert (
@@ -120,7 +119,7 @@ def test_what_cannot_be_written_whole_is_named_and_left_out(tmp_path, name):
     ],
 )
 def test_every_way_in_which_a_disk_refuses_has_its_cure(number, cure):
-    line = _explained(OSError(number, "refused", "runs/mine/report.html"))
+    line = explained(OSError(number, "refused", "runs/mine/report.html"))
     assert line.startswith("runs/mine/report.html: ") and cure in line
     assert "nothing that was simulated is lost" in line
     assert disk_errno(FileNotFoundError(errno.ENOENT, "no")) is None

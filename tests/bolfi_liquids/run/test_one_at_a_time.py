@@ -14,8 +14,7 @@ from typer.testing import CliRunner
 import bolfi_liquids as bl
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.run.lock import LOCK, alone_in
-from bolfi_liquids.run.run import RUN_TOML, Run
+from bolfi_liquids.run.run import LOCK, RUN_TOML, Run, alone_in
 
 RECORD = {
     "settings": {"budget": 20, "seed": 0},

@@ -19,9 +19,16 @@ from xarray import Dataset, DataTree
 import bolfi_liquids as bl
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.reporting.warnings import Results
-from bolfi_liquids.run.lock import LOCK, alone_in
-from bolfi_liquids.run.result_file import read_result, write_result
-from bolfi_liquids.run.run import RESULTS, RUN_TOML, SIMULATIONS, Run, check_resumable
+from bolfi_liquids.run.results import read_result, write_result
+from bolfi_liquids.run.run import (
+    LOCK,
+    RESULTS,
+    RUN_TOML,
+    SIMULATIONS,
+    Run,
+    alone_in,
+    check_resumable,
+)
 
 RECORD = {
     "created": "2026-01-01T00:00:00+00:00",
@@ -131,9 +138,9 @@ def test_what_is_no_run_has_no_result_and_says_what_makes_one(tmp_path):
 
 def test_simulations_that_were_removed_are_missed(run, caplog):
     (run.path / SIMULATIONS).unlink()
-    with run.bank() as bank:
-        assert len(bank) == 0
-    assert SIMULATIONS in caplog.text and "made again" in caplog.text
+    assert Run.open(run.path).result("calibrate") is not None
+    (notice,) = caplog.records
+    assert str(run.path / SIMULATIONS) in notice.getMessage()
 
 
 def test_resuming_where_no_run_is_names_the_nearest(tmp_path):
@@ -200,7 +207,7 @@ HOLDER = """
 import sys, time
 from pathlib import Path
 from bolfi_liquids.reporting.warnings import Results
-from bolfi_liquids.run.lock import alone_in
+from bolfi_liquids.run.run import alone_in
 
 with alone_in(Path(sys.argv[1])):
     print("entered", flush=True)

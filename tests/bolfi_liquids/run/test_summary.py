@@ -8,7 +8,7 @@ import numpy as np
 from bolfi_liquids.calibration.summary import CalibrationSummary
 from bolfi_liquids.criticism.summary import CriticismSummary
 from bolfi_liquids.pouring.result import PourSummary
-from bolfi_liquids.run.summary import write_summary
+from bolfi_liquids.run.results import write_summary
 
 
 def test_sections_survive_writing_and_reading(calibration, criticism_summary):

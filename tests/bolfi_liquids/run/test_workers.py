@@ -13,14 +13,13 @@ import pytest
 from distributed import LocalCluster
 
 import bolfi_liquids as bl
-from bolfi_liquids.cli.compute import ComputeOptions
+from bolfi_liquids.cli.options import ComputeOptions
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.run.compute import open_compute
-from bolfi_liquids.run.workers import background_process, processes
+from bolfi_liquids.run.compute import background_process, open_compute, processes
 
 WORKING = """
 import os, signal, time
-from bolfi_liquids.run.workers import processes
+from bolfi_liquids.run.compute import processes
 
 # these tests may themselves be run where it is ignored
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -34,7 +33,7 @@ with processes(2) as pool:
 
 IN_BACKGROUND = """
 import os, signal, time
-from bolfi_liquids.run.workers import background_process
+from bolfi_liquids.run.compute import background_process
 
 with background_process(0) as pool:
     pool.submit(os.getpid).result()
