@@ -14,16 +14,17 @@ from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.described_liquid import Described, read_effects
 from bolfi_liquids.inputs.open import open_recording
 from bolfi_liquids.movie.file import KINDS, write_movie
-from bolfi_liquids.movie.landed_liquid import GRAVITY, landed, level
 from bolfi_liquids.movie.pour import (
+    GRAVITY,
+    landed,
+    level,
     pour_pictures,
     pour_view,
     receiver_glass,
     source_glass,
 )
+from bolfi_liquids.movie.rendering import Glass, OrthographicView, surface
 from bolfi_liquids.movie.stir import stir_pictures, stir_view
-from bolfi_liquids.movie.surface import Glass, surface
-from bolfi_liquids.movie.view import OrthographicView
 
 UP = np.array([0.0, 0.0, 1.0])
 FAR = Glass(0.01, 0.01, np.array([9.0, 9.0, 9.0]), UP)  # holds nothing of what is drawn
@@ -72,7 +73,6 @@ def test_points_are_where_an_orthographic_camera_sees_them():
     tilted = OrthographicView(201, 101, 500.0, (0.1, 0.2, 0.3), 0.0, np.radians(30.0))
     up = 0.04 * np.cos(np.radians(30.0)) + 0.03 * np.sin(np.radians(30.0))
     assert tilted.pixels(point) == pytest.approx([110.0, 50.0 - 500.0 * up])
-    assert tilted.world(tilted.camera(point)) == pytest.approx(point)
     assert tilted.axes @ tilted.axes.T == pytest.approx(np.eye(3))
     assert tilted.camera(point - [0.0, 0.1, 0.0])[2] > tilted.camera(point)[2]
 
