@@ -11,7 +11,7 @@ import typer
 from ..errors import InputError
 from ..online.settings import OnlineSettings
 from ..wording import command
-from .errors import FAILED, INTERRUPTED, Aborted
+from .errors import ABORTED, FAILED, INTERRUPTED, Aborted
 from .options import CupsOption, RigOption, check_needed, check_one, examples
 
 if TYPE_CHECKING:
@@ -108,10 +108,9 @@ def aborted_is_told() -> Iterator[None]:
 
     try:
         yield
-    except SessionInterrupted as err:
-        raise Aborted(str(err), INTERRUPTED) from err
-    except SessionStopped as err:
-        raise Aborted(str(err)) from err
+    except (SessionInterrupted, SessionStopped) as err:
+        by_person = isinstance(err, SessionInterrupted)
+        raise Aborted(str(err), INTERRUPTED if by_person else ABORTED) from err
 
 
 def execute(

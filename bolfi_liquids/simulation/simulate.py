@@ -261,14 +261,11 @@ def described_liquids(values: Mapping[str, ArrayLike], **shared: Any) -> Liquids
         InputError: A value cannot be used, or arrays differ in length.
     """
     columns = {name: _column(name, value) for name, value in values.items()}
-    shapes = {name: column.shape for name, column in columns.items()}
-    try:
-        (count,) = np.broadcast_shapes(*shapes.values(), (1,))
-    except ValueError as err:
+    shapes = {column.shape for column in columns.values()} - {()}
+    if len(shapes) > 1 or any(len(shape) > 1 or not shape[0] for shape in shapes):
+        given = {name: column.shape for name, column in columns.items()}
         fix = "give numbers, or arrays of one length"
-        raise InputError(f"shapes {shapes}", where="simulate", fix=fix) from err
-    if not count:
-        raise InputError("no simulation", where="simulate", fix="give at least one value")
+        raise InputError(f"shapes {given}", where="simulate", fix=fix)
 
     def described(*of_one: Any) -> Described:
         return Described(**dict(zip(columns, of_one, strict=True)), **shared)
@@ -383,13 +380,12 @@ def _with_rig(
     sizes = {} if rig is None else rig
     if not isinstance(sizes, Mapping):
         raise InputError(f"{rig!r:.80}", where=Argument("rig"), fix="give sizes by name")
-    for name, value in sizes.items():
-        if name not in RIG_SIZES or number_of(value, f"rig: {name}") <= 0.0:
-            fix = f"give positive numbers of {', '.join(RIG_SIZES)}"
-            raise InputError(f"{value!r}", where=f"rig: {name}", fix=fix)
     weights = [name for name in STICK_WEIGHT if name in sizes]
-    if len(weights) > 1:
-        raise InputError(f"{' and '.join(weights)} are given", where="rig", fix="give one of them")
+    for name, value in sizes.items():
+        positive = name in RIG_SIZES and number_of(value, f"rig: {name}") > 0.0
+        if not positive or weights[1:] == [name]:
+            fix = f"give positive {', '.join(LENGTHS)}, and {' or '.join(STICK_WEIGHT)}"
+            raise InputError(f"{value!r}", where=f"rig: {name}", fix=fix)
     replaced = STICK_WEIGHT if weights else ()
     return {name: value for name, value in attrs.items() if name not in replaced} | dict(sizes)
 
