@@ -26,9 +26,8 @@ def kept(path, *recordings):
     return run
 
 
-@pytest.mark.parametrize("name", ["a" * 252 + ".nc", "ä" * 126 + ".nc", "𝄞" * 63 + ".nc"])
-def test_a_recording_of_any_name_is_copied(tmp_path, name):
-    water, given = bundled_recording("water"), tmp_path / name
+def test_a_recording_of_any_name_is_copied(tmp_path):
+    water, given = bundled_recording("water"), tmp_path / ("𝄞" * 63 + ".nc")
     given.write_bytes(water.path.read_bytes())
     run = kept(tmp_path, water, read_recording(given))
     copies = [one.path for one in run.recordings]
@@ -36,12 +35,13 @@ def test_a_recording_of_any_name_is_copied(tmp_path, name):
     assert [one.hash for one in run.recordings] == 2 * [water.hash]
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_copy_is_told_as_one_and_never_to_be_imported(tmp_path, damage):
+def test_a_damaged_copy_is_told_as_one_and_never_to_be_imported(tmp_path):
     run = kept(tmp_path, bundled_recording("water"))
     (copy,) = (tmp_path / "recordings").iterdir()
-    copy.write_bytes(DAMAGES[damage](copy.read_bytes()))
-    with pytest.raises(InputError) as caught:
-        _ = run.recordings
-    assert caught.value.where == str(copy)
-    assert "put the original back" in caught.value.fix and "import" not in str(caught.value)
+    whole = copy.read_bytes()
+    for damage in DAMAGES.values():
+        copy.write_bytes(damage(whole))
+        with pytest.raises(InputError) as caught:
+            _ = run.recordings
+        assert caught.value.where == str(copy)
+        assert "put the original back" in caught.value.fix and "import" not in str(caught.value)

@@ -68,9 +68,7 @@ def test_a_run_is_not_overwritten(tmp_path):
     ("section", "field", "value"),
     [
         ("settings", "seed", 1),
-        ("settings", "prior", {"viscosity": {"family": "Normal"}}),
         ("simulator", "recording_1", {"particles": 500, "cup": {"radius": 0.04}}),
-        ("simulator", "recording_2", {"particles": 1000}),
         ("inputs", "sha256", ["cd"]),
     ],
 )
@@ -106,28 +104,36 @@ def test_a_run_grows_in_the_field_that_may_grow(tmp_path):
         begin(tmp_path, RECORD, resume=True, growing=growing)
 
 
-@pytest.mark.parametrize("name", [SIMULATIONS, *RESULTS.values()])
-def test_results_without_settings_are_left_alone(tmp_path, name):
-    (tmp_path / name).write_bytes(b"precious")
-    with pytest.raises(InputError, match=f"holds {name} without run.toml"):
-        begin(tmp_path, resume=True)
-    assert (tmp_path / name).read_bytes() == b"precious"
+def test_results_without_settings_are_left_alone(tmp_path):
+    for name in (SIMULATIONS, *RESULTS.values()):
+        (tmp_path / name).write_bytes(b"precious")
+        with pytest.raises(InputError, match=f"holds {name} without run.toml"):
+            begin(tmp_path, resume=True)
+        assert (tmp_path / name).read_bytes() == b"precious"
+        (tmp_path / name).unlink()
 
 
-@pytest.mark.parametrize("content", [b'created = "\xe9"', b"= 1"])
-def test_a_record_that_is_no_toml_is_named(tmp_path, content):
-    (tmp_path / RUN_TOML).write_bytes(content)
-    with pytest.raises(InputError, match="run.toml: not TOML"):
-        Run.open(tmp_path)
+LOST = {
+    "no TOML": lambda whole: b'created = "\xe9"',
+    "cut before its settings": lambda whole: whole[: whole.index(b"\n[settings]")],
+    "cut before its versions": lambda whole: whole[: whole.index(b"[versions]")],
+    "removed": lambda whole: None,
+}
 
 
-@pytest.mark.parametrize("last", ["created", "\n[settings]", "[versions]", "[versions]\n"])
-def test_a_record_that_is_cut_off_is_named_though_it_is_toml(run, last):
-    text = (run.path / RUN_TOML).read_text(encoding="utf-8")
-    end = text.index(last) + (len(last) if last.endswith("\n") else 0)
-    (run.path / RUN_TOML).write_text(text[:end], encoding="utf-8")
-    with pytest.raises(InputError, match=r"run\.toml: is cut off.*restore the file"):
-        bl.Calibration.open(run.path)
+@pytest.mark.parametrize("how", LOST)
+def test_whose_record_is_lost_is_calibrated_anew_on_its_own_recordings(run, how):
+    file, copies = run.path / RUN_TOML, [str(one) for one in (run.path / "recordings").iterdir()]
+    if (left := LOST[how](file.read_bytes())) is None:
+        file.unlink()
+    else:
+        file.write_bytes(left)
+    for read in (bl.Calibration.open, bl.choose_pour):
+        with pytest.raises(InputError) as refused:
+            read(run.path)
+        assert refused.value.where == str(run.path if left is None else file)
+        *_, anew = refused.value.fix.partition("bolfi-liquids ")
+        assert anew.split() == ["calibrate", *copies, "--out", f"{run.path}_anew"]
 
 
 def test_what_is_no_run_has_no_result_and_says_what_makes_one(tmp_path):
@@ -190,7 +196,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("count", [12, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [5, pytest.param(200, marks=pytest.mark.slow)])
 def test_of_two_commands_that_start_together_exactly_one_enters(tmp_path, count):
     script = tmp_path / "twins.py"
     script.write_text(TWINS, encoding="utf-8")
