@@ -262,7 +262,7 @@ def described_liquids(values: Mapping[str, ArrayLike], **shared: Any) -> Liquids
     """
     columns = {name: _column(name, value) for name, value in values.items()}
     shapes = {column.shape for column in columns.values()} - {()}
-    if len(shapes) > 1 or any(len(shape) > 1 or not shape[0] for shape in shapes):
+    if len(shapes) > 1 or any(len(shape) > 1 or 0 in shape for shape in shapes):
         given = {name: column.shape for name, column in columns.items()}
         fix = "give numbers, or arrays of one length"
         raise InputError(f"shapes {given}", where="simulate", fix=fix)
