@@ -112,17 +112,13 @@ def _from_row(row: tuple) -> Replicate:
 def _difference(path: str, stored: Mapping[str, str], settings: Mapping[str, str]) -> str:
     """Why a store is refused."""
     unlike = [
-        name
+        f"{name}: stored {_start(stored.get(name))}, now {_start(settings.get(name))}"
         for name in sorted(set(stored) | set(settings))
         if stored.get(name) != settings.get(name)
     ]
-    told = "; ".join(
-        f"{name} was {_start(stored.get(name))} and is {_start(settings.get(name))}"
-        for name in unlike
-    )
     return (
-        f"{path} holds replicates made with other settings ({told}); restore these, or choose "
-        "another file"
+        f"{path} holds replicates made with other settings "
+        f"({'; '.join(unlike)}); restore these, or choose another file"
     )
 
 
