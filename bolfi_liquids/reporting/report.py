@@ -66,6 +66,7 @@ def report(
         ThreadPoolExecutor(1) as thread,
     ):
         results = Results.of(opened)
+        opened.tell_missing_bank()
         facts = results.facts
         for notice in results.outdated:
             logger.warning(notice)

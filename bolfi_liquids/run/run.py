@@ -154,10 +154,6 @@ class Run:
         """
         run = cls(path := run_path(given), _read(path))
         run._check_generation()
-        if (path / RESULTS["calibrate"]).exists() and not (path / SIMULATIONS).exists():
-            logger.warning(
-                "%s is missing: what needs its simulations makes them again", path / SIMULATIONS
-            )
         return run
 
     @classmethod
@@ -201,6 +197,7 @@ class Run:
                     raise InputError("holds a run already", where=str(path), fix=fix)
                 run = cls(path, cls.open(path)._continued(record, growing))
                 run.write_summary()  # a killed command may not have come to it
+                run.tell_missing_bank()
             else:
                 _check_no_results(path)
                 _write(path, record)
@@ -273,6 +270,12 @@ class Run:
         """Of the parameters, before stirring."""
         return read_prior(self.record["settings"]["prior"])
 
+    def tell_missing_bank(self) -> None:
+        """Log that the simulations of a finished calibration were removed, if they were."""
+        path = self.path / SIMULATIONS
+        if not path.exists() and (self.path / RESULTS["calibrate"]).exists():
+            logger.warning("%s is missing: what needs its simulations makes them again", path)
+
     @contextmanager
     def bank(self) -> "Iterator[SimulationBank]":
         """Every finished simulation.
@@ -284,6 +287,7 @@ class Run:
         from ..inference import SimulationBank
 
         path = self.path / SIMULATIONS
+        self.tell_missing_bank()
         try:
             bank = SimulationBank(path)
         except (ValueError, sqlite3.Error) as err:

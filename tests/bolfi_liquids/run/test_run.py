@@ -142,11 +142,14 @@ def test_what_is_no_run_has_no_result_and_says_what_makes_one(tmp_path):
         bl.choose_pour(tmp_path)
 
 
-def test_simulations_that_were_removed_are_missed(run, caplog):
+def test_simulations_that_were_removed_are_missed(run, short_recording, settings, caplog):
     (run.path / SIMULATIONS).unlink()
-    assert Run.open(run.path).result("calibrate") is not None
-    (notice,) = caplog.records
-    assert str(run.path / SIMULATIONS) in notice.getMessage()
+    bl.calibrate(short_recording, out=run.path, resume=True, progress=False, **settings)
+    bl.report(run.path, moving=False, progress=False)
+    with run.bank() as bank:
+        assert len(bank) == 0
+    told = [one.getMessage() for one in caplog.records if SIMULATIONS in one.getMessage()]
+    assert len(told) == 3
 
 
 def test_resuming_where_no_run_is_names_the_nearest(tmp_path):
