@@ -267,10 +267,10 @@ def described_liquids(values: Mapping[str, ArrayLike], **shared: Any) -> Liquids
         fix = "give numbers, or arrays of one length"
         raise InputError(f"shapes {given}", where="simulate", fix=fix)
 
-    def described(*of_one: Any) -> Described:
+    def one(*of_one: Any) -> Described:
         return Described(**dict(zip(columns, of_one, strict=True)), **shared)
 
-    return np.vectorize(described, otypes=[object])(*columns.values())
+    return np.vectorize(one, otypes=[object])(*columns.values())
 
 
 def _column(name: str, value: ArrayLike) -> NDArray:

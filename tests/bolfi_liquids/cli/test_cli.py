@@ -9,6 +9,7 @@ from typing import Annotated
 
 import pytest
 import typer
+from bolfi_liquids.hardware.vision.opencv import opencv
 from typer.main import get_command
 from typer.testing import CliRunner
 
@@ -86,6 +87,13 @@ def test_a_missing_file_is_one_line_and_debug_shows_where(tmp_path):
     )
     assert debug.returncode == 2
     assert "Traceback" in debug.stderr and "open_recording" in debug.stderr
+
+
+def test_a_missing_extra_is_named(stir, monkeypatch):
+    opencv.cache_clear()  # an earlier test of this process may have imported it
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    result = CliRunner().invoke(app, ["rig", "calibrate-cameras", "--print-board", "board.png"])
+    assert result.exit_code == 2 and "pip install 'bolfi-liquids[" in result.stderr
 
 
 def test_a_group_without_a_command_shows_its_help():
