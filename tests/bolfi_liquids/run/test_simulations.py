@@ -60,6 +60,7 @@ def test_diverged_ones_are_left_out():
         compute = Compute(bank=bank, batch=8)
         kept = simulate_kept(Made(simulate), {"a": np.array([0.0, 2.0, 1.0])}, [1, 2, 3], compute)
         np.testing.assert_array_equal(kept.signals, [[0.0], [1.0]])
+        assert kept.places.tolist() == [0, 2]
         with pytest.raises(RuntimeError, match="all 1 simulations failed"):
             simulate_kept(Made(simulate), {"a": np.array([2.0])}, [2], compute)
 
