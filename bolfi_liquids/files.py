@@ -70,15 +70,15 @@ def new_file(path: str | Path, where: str, *, suffix: str = "", replace: bool = 
             file, or no file can be made in its directory.
     """
     path = given_path(path, where)
-    if suffix and path.suffix != suffix:
-        what = f"ends in {path.suffix!r}"
-        raise InputError(what, where=str(path), fix=f"give a name in {suffix}")
-    if path.exists() and not replace:
-        raise InputError("exists already", where=str(path), fix="choose another name")
-    if not path.parent.is_dir():
-        raise InputError("no such directory", where=str(path.parent), fix="make it first")
-    if path.is_dir():
-        raise InputError("is a directory", where=str(path), fix="give the name of a file")
+    ends_otherwise, parent = suffix and path.suffix != suffix, path.parent
+    for wrong, at, what, fix in (
+        (ends_otherwise, path, f"ends in {path.suffix!r}", f"give a name in {suffix}"),
+        (path.exists() and not replace, path, "exists already", "choose another name"),
+        (not parent.is_dir(), parent, "no such directory", "make it first"),
+        (path.is_dir(), path, "is a directory", "give the name of a file"),
+    ):
+        if wrong:
+            raise InputError(what, where=str(at), fix=fix)
     try:
         tempfile.TemporaryFile(dir=path.parent).close()
     except OSError as err:

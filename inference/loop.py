@@ -185,7 +185,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
     require(budget + told >= engine.initial, "budget", due, budget, "raise budget or lower initial")
     with ExitStack() as stack:
         compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
-        advance = stack.enter_context(progress_bar("simulations", budget + confirm, shown=progress))
+        bar = progress_bar("simulations", budget + confirm, shown=progress, at_least=confirm > 0)
+        advance = stack.enter_context(bar)
         runner = stack.enter_context(Runner(simulator, compute, engine.expected_shape, identity))
         schedule = _in_rounds if in_rounds else _in_flight
         finished = schedule(engine, runner, budget, batch)

@@ -1,44 +1,104 @@
 """Progress of long work, on stderr so that stdout stays for results."""
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 Advance = Callable[[int], object]
 """Moves a bar on by so many steps."""
 
+Report = Callable[[str, int, int], object]
+"""(phase, steps finished in it since the last call, steps in it)"""
+
+LINES_APART = 60.0  # s between lines of one phase, where there is no terminal
+
+
+@contextmanager
+def phases(*, shown: bool, at_least: bool = False) -> Iterator[Report]:
+    """A bar for the phase that long work is in.
+
+    Without a terminal: a line for each phase, and another every minute (`pouring, 12 of 64`).
+
+    Args:
+        shown: False for silence.
+        at_least: Whether a phase may turn out to need more steps than it begins with.
+    """
+    if not shown:
+        yield lambda phase, finished, total: None
+        return
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    current, done = "", 0
+    lines = _lines(console, "to run at least" if at_least else "to run")
+    with _bar(console) if console.is_terminal else lines as show:
+
+        def report(phase: str, finished: int, total: int) -> None:
+            nonlocal current, done
+            done = finished if phase != current else done + finished
+            current = phase
+            show(phase, done, max(done, total))
+
+        yield report
+
 
 @contextmanager
 def progress_bar(
-    task: str, total: int, *, shown: bool | Callable[[int], object], done: int = 0
+    task: str,
+    total: int,
+    *,
+    shown: bool | Callable[[int], object],
+    done: int = 0,
+    at_least: bool = False,
 ) -> Iterator[Advance]:
-    """A bar that the yielded function moves on; one line only where there is no terminal.
+    """The same for work of one phase; the yielded function moves the bar on.
 
     Args:
         task: What is being done, in a few words.
         total: Steps in all.
         shown: False for silence; a function is called with the steps instead.
         done: Steps made before.
+        at_least: Whether more steps may turn out to be needed.
     """
     if not isinstance(shown, bool):
         yield shown
         return
-    if not shown:
-        yield lambda steps: None
-        return
-    from rich.console import Console
+    with phases(shown=shown, at_least=at_least) as report:
+        report(task, done, total)
+        yield lambda steps: report(task, steps, total)
+
+
+@contextmanager
+def _bar(console: Any) -> Iterator[Report]:
+    """A bar, which begins anew with each phase."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        console.print(f"{task}: {total - done} to run", highlight=False)
-        yield lambda steps: None
-        return
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-    )
+    text = TextColumn("{task.description}")
+    columns = text, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
     with Progress(*columns, console=console) as bar:
-        handle = bar.add_task(task, total=total, completed=done)
-        yield lambda steps: bar.advance(handle, steps)
+        handle = bar.add_task("starting", total=None)
+
+        def show(phase: str, done: int, total: int) -> None:
+            bar.update(handle, description=phase, completed=done, total=total)
+
+        yield show
+
+
+@contextmanager
+def _lines(console: Any, to_run: str) -> Iterator[Report]:
+    """A line where a phase begins, and where the last one is old."""
+    current, last = "", 0.0
+
+    def show(phase: str, done: int, total: int) -> None:
+        nonlocal current, last
+        now = time.monotonic()
+        if phase != current:
+            console.print(f"{phase}: {total - done} {to_run}", highlight=False)
+        elif now - last > LINES_APART:
+            console.print(f"{phase}, {done} of {total}", highlight=False)
+        else:
+            return
+        current, last = phase, now
+
+    yield show

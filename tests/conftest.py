@@ -91,8 +91,7 @@ def made_poured_run(tmp_path_factory):
                            draws=100)
         bl.choose_pour(run, budget=24, iterations=7, draws=16)
     """
-    from bolfi_liquids.run.provenance import generations
-    from bolfi_liquids.run.result_file import read_result
+    from bolfi_liquids.run.results import generations, read_result
     from bolfi_liquids.run.run import RESULTS, RUN_TOML, Run
 
     folder = tmp_path_factory.mktemp("poured_run")

@@ -26,8 +26,7 @@ from ..inputs.start import check_start
 from ..progress import after_first, progress_bar
 from ..run.compute import open_compute
 from ..run.given_pours import keep_pours
-from ..run.provenance import generations, versions
-from ..run.recordings import keep_recordings
+from ..run.results import generations, versions
 from ..run.run import RUN_TOML, Run
 from ..run.simulations import warn_of_failures
 from ..simulators import StirSimulator, stir_simulator
@@ -144,7 +143,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         open_compute(executor, timeout) as compute,
         Run.begun(path, record, resume=resume, growing="settings.budget") as run,
     ):
-        keep_recordings(path, stirring.recordings)
+        run.keep_recordings(stirring.recordings)
         if table is not None:
             keep_pours(path, table, made_with)
             run.write_summary()
@@ -186,7 +185,8 @@ def _calibrate(
     needed = settings.budget + CLEAN_RUNS * len(clean) + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
     with run.bank() as bank, ExitStack() as stack:
         kept = min(len(bank), needed)
-        bar = progress_bar("simulating stirs", needed, shown=progress, done=kept)
+        # more are made where the first that confirm the posterior move it
+        bar = progress_bar("simulating stirs", needed, shown=progress, done=kept, at_least=True)
         advance = after_first(kept, stack.enter_context(bar))
         compute = replace(compute, batch=settings.batch, bank=bank)
         error, noise = None, None
@@ -212,7 +212,7 @@ def _calibrate(
                 settings.particles,
                 run.prior,
                 compute=replace(compute, batch=CriticismSettings.batch),
-                report=lambda _, finished: advance(finished),
+                report=lambda _phase, finished, _total: advance(finished),
             )
             error = model_error(stirring, fit.best["viscosity"], learned)
             noise = noise_beside(stirring, error)

@@ -75,7 +75,8 @@ def clean_residuals(
         particles: Number of particles of the simulated liquid; 0: cells follow the stick.
         prior: Of the liquid's parameters.
         compute: Where simulations are made and kept.
-        report: Called with the phase and the number of simulations finished in it.
+        report: Called with the phase, the number of simulations finished in it since the last
+            call, and their number in all.
 
     Raises:
         RuntimeError: Every simulation of one of them failed.
@@ -85,9 +86,9 @@ def clean_residuals(
     def learn(recording: Recording) -> Clean:
         name, made = recording.path.name, []
 
-        def counted(_: str, finished: int) -> None:
+        def counted(phase: str, finished: int, total: int) -> None:
             made.append(finished)
-            report(f"baseline {name}", finished)
+            report(f"baseline {name}, {phase}", finished, total)
 
         cameras = camera_noise([recording])
         experiment = stir_experiment(stir_simulator([recording], particles), cameras, None, name)

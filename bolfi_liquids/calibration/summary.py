@@ -13,7 +13,7 @@ from pydantic import computed_field
 from ..errors import InputError
 from ..inputs.frame import named_faults
 from ..models import stirring_error
-from ..run.summary import Number, Section
+from ..run.results import Number, Section
 from ..simulators import StirSimulator
 from ..wording import degrees, with_unit
 from .stirs import irreducible_rms, rms

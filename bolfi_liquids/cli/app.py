@@ -9,27 +9,34 @@ from typing import Annotated
 import typer
 
 from .. import __version__
-from ..inputs.settings import CalibrationSettings, CriticismSettings, PourSettings
+from ..guide import PAGES, read_page
+from ..inputs.settings import CalibrationSettings, CriticismSettings, PourSettings, SbcSettings
 from ..wording import command
-from . import check as cli_check
-from . import guide, import_table, printed
+from . import import_table, printed
 from . import record as cli_record
 from . import rig as cli_rig
 from . import simulate as cli_simulate
 from . import trim as cli_trim
-from .compute import ComputeOptions, StudyComputeOptions
-from .errors import OneLineErrors
-from .examples import examples
-from .grouped import grouped
-from .notices import print_notices
+from .errors import FAILED, OneLineErrors, print_notices
 from .options import (
-    CalibrationData,
-    CriticismData,
-    ExecutionOptions,
-    PourOptions,
+    BaselineOption,
+    ComputeOptions,
+    CupsOption,
+    LiquidOption,
+    PoursOption,
+    RigOption,
     RunArgument,
-    changed,
+    StudyComputeOptions,
+    check_needed,
+    check_one,
+    examples,
+    grouped,
+    opened_pours,
+    typed_options,
 )
+
+EXECUTION = ("--arm", "--emulator", "--rig", "--despite-bad-fit")
+"""Options of `pour` that say how a chosen pour is carried out."""
 
 app = typer.Typer(
     cls=OneLineErrors,
@@ -73,14 +80,18 @@ def _global_options(
     )
 )
 @grouped
-def calibrate(
+def calibrate(  # noqa: PLR0913  an option each
+    ctx: typer.Context,
     recordings: Annotated[
         list[Path], typer.Argument(metavar="RECORDING", help="NetCDF files, of one liquid.")
     ],
     out: Annotated[Path, typer.Option(metavar="RUN", help="Directory of the run.")],
     settings: CalibrationSettings,
-    given: CalibrationData,
     compute: ComputeOptions,
+    pours: PoursOption = None,
+    liquid: LiquidOption = None,
+    cups: CupsOption = None,
+    baseline: BaselineOption = None,
     resume: Annotated[
         bool,
         typer.Option(
@@ -94,9 +105,11 @@ def calibrate(
     from ..reporting.warnings import Results
     from ..run.run import check_resumable
 
+    check_needed(ctx, "--pours", "--liquid", "--cups")
     if resume:
         check_resumable(out)
-    opened, data = open_recordings(recordings), given.arguments
+    opened, table = open_recordings(recordings), opened_pours(pours, liquid)
+    data = {"pours": table, "cups": cups, "baseline": baseline or ()}
     with printed.complaints_among_results(), compute.arguments() as where:
         calibration = run_calibrate(
             opened, out=out, resume=resume, **data, **where, **asdict(settings)
@@ -114,18 +127,31 @@ def calibrate(
     )
 )
 @grouped
-def criticise(
+def criticise(  # noqa: PLR0913  an option each
+    ctx: typer.Context,
     run: RunArgument,
-    given: CriticismData,
     settings: CriticismSettings,
     compute: ComputeOptions,
+    pours: PoursOption = None,
+    liquid: LiquidOption = None,
+    cups: CupsOption = None,
+    baseline: BaselineOption = None,
+    held_out: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="RECORDING", help="Same liquid, other path or speed: the proof."),
+    ] = None,
+    held_out_pours: Annotated[
+        Path | None, typer.Option(metavar="TABLE", help="Other pours of the liquid: the proof.")
+    ] = None,
 ) -> None:
     """Find which effect the model lacks, where it misses the data."""
     from ..criticism.criticise import criticise as run_criticise
 
-    data = given.arguments
+    check_needed(ctx, "--pours", "--liquid", "--cups", "--held-out-pours")
+    fitted = {"pours": opened_pours(pours, liquid), "cups": cups, "baseline": baseline or ()}
+    proof = {"held_out": held_out or (), "held_out_pours": opened_pours(held_out_pours, liquid)}
     with compute.arguments() as where:
-        criticism = run_criticise(run, **data, **asdict(settings), **where)
+        criticism = run_criticise(run, **fitted, **proof, **asdict(settings), **where)
     printed.print_findings(criticism)
     printed.print_next_pour(criticism.calibration)
 
@@ -138,30 +164,57 @@ def criticise(
     )
 )
 @grouped
-def pour(
+def pour(  # noqa: PLR0913  an option each
+    ctx: typer.Context,
     run: RunArgument,
-    options: PourOptions,
     settings: PourSettings,
-    execution: ExecutionOptions,
     compute: ComputeOptions,
+    cups: CupsOption = None,
+    given: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="TABLE", help="What pours of the liquid spilled; RUN keeps it for later pours."
+        ),
+    ] = None,
+    liquid: LiquidOption = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Choose a pour even though the fit is bad.")
+    ] = False,
+    execute: Annotated[
+        bool, typer.Option("--execute", help="Carry out the pour that RUN has chosen already.")
+    ] = False,
+    rig: RigOption = None,
+    arm: Annotated[
+        bool, typer.Option("--arm", help="With --execute: move the arm, once a sentence is typed.")
+    ] = False,
+    emulator: Annotated[
+        bool, typer.Option("--emulator", help="With --execute: move an emulated arm.")
+    ] = False,
+    despite_bad_fit: Annotated[
+        bool,
+        typer.Option("--despite-bad-fit", help="With --arm: though it was chosen over a bad fit."),
+    ] = False,
 ) -> None:
     """Choose the pour that spills least over the posterior.
 
     What a criticism accepted is part of the liquid, and pours that were made correct the choice.
     With --execute nothing is chosen anew: it is a dry run of the chosen pour, unless armed.
     """
-    if execution.execute:
-        if typed := changed(options, settings, compute):
+    check_needed(ctx, "--execute", *EXECUTION)
+    if execute:
+        if typed := set(typed_options(ctx)) - {"--execute", *EXECUTION}:
             raise typer.BadParameter(
-                f"{', '.join(typed)}: of the choice of a pour, which is made without --execute; "
-                "with it the pour is carried out that RUN has chosen already"
+                f"{', '.join(sorted(typed))}: of the choice of a pour, which is made without "
+                "--execute; with it the pour is carried out that RUN has chosen already"
             )
-        cli_record.execute(run, execution)
+        check_one(ctx, "--arm", "--emulator")
+        cli_record.execute(run, rig, arm=arm, emulate=emulator, despite_bad_fit=despite_bad_fit)
         return
     from ..pouring.choose import choose_pour
     from ..reporting.warnings import Results
 
-    data = options.arguments
+    check_needed(ctx, "--given", "--liquid")
+    data = {"cups": cups, "given": opened_pours(given, liquid), "force": force}
     with compute.arguments() as where:
         chosen = choose_pour(run, **data, **asdict(settings), **where)
     printed.print_pour(chosen)
@@ -219,10 +272,63 @@ def demo(
 app.command("import", epilog=import_table.EPILOG)(import_table.import_table)
 app.command(epilog=cli_record.EPILOG)(cli_record.record)
 app.command(epilog=cli_trim.EPILOG)(cli_trim.trim)
-app.command(epilog=guide.EPILOG)(guide.guide)
+
+
+@app.command(epilog=examples("guide", "guide files", "guide troubleshooting | less -R"))
+def guide(
+    page: Annotated[
+        str | None, typer.Argument(metavar="|".join(PAGES), help="Which; without it, a list.")
+    ] = None,
+) -> None:
+    """Show a page of the guide: files, priors, messages and more."""
+    if page is None:
+        width = max(map(len, PAGES))
+        for name, about in PAGES.items():
+            typer.echo(f"{name:{width}}  {about}")
+        typer.echo("read one: bolfi-liquids guide PAGE")
+        return
+    from rich.console import Console
+    from rich.markdown import Markdown
+
+    Console().print(Markdown(read_page(page), hyperlinks=False))
+
+
 app.add_typer(cli_simulate.app, name="simulate")
 app.add_typer(cli_rig.app, name="rig")
-app.add_typer(cli_check.app, name="check")
+check = typer.Typer(help="Long checks; a killed one goes on.", no_args_is_help=True)
+app.add_typer(check, name="check")
+
+
+@check.command(
+    epilog=examples("check sbc --out runs/sbc", "check sbc --runs 20 --sequential 0 --design 64")
+)
+@grouped
+def sbc(
+    settings: SbcSettings,
+    compute: StudyComputeOptions,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Directory of the results.")] = Path(
+        "runs/sbc"
+    ),
+    recording: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Whose path and rig are used; else bundled ones."),
+    ] = None,
+) -> None:
+    """Simulation-based calibration of the whole pipeline.
+
+    Stirs of liquids drawn from the prior are calibrated, and the truths compared with the
+    posteriors. The exit status is 1 when ranks or coverage fail their test. What has finished in
+    DIR before is kept; more replicates can be added to it.
+    """
+    from ..checks.sbc import check_sbc
+
+    with compute.opened() as opened:
+        found = check_sbc(out, recording, settings=settings, compute=opened)
+    for name, made in found.items():
+        typer.echo(f"{name}\n\n{made}\n")
+    typer.echo(f"results: {out}")
+    if not all(made.ok for made in found.values()):
+        raise typer.Exit(FAILED)
 
 
 def main() -> None:

@@ -1,6 +1,7 @@
-"""Errors on the command line: one line for what a person can mend, a traceback on --debug."""
+"""What commands write to stderr: notices, and errors in one line of what a person can mend."""
 
 import errno
+import logging
 import os
 import sqlite3
 import sys
@@ -22,6 +23,7 @@ USAGE_ERROR = 2
 ABORTED = 3  # something ended a recording early; what there is was kept
 INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 GIVEN = "bolfi_liquids.given"  # key of the arguments as they were typed
+PACKAGE = "bolfi_liquids"
 
 
 class Aborted(RuntimeError):
@@ -53,10 +55,10 @@ class OneLineErrors(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         try:
-            _refuse_empty(ctx.meta[GIVEN])
+            _check_none_empty(ctx.meta[GIVEN])
             return super().invoke(ctx)
         except KeyboardInterrupt:
-            _say(_how_to_go_on(sys.argv[1:]))
+            say(how_to_go_on(sys.argv[1:]))
             raise typer.Exit(INTERRUPTED) from None
         except (typer.Exit, typer.Abort):  # RuntimeErrors by descent, but no errors
             raise
@@ -67,11 +69,10 @@ class OneLineErrors(TyperGroup):
         except (ValueError, OSError, RuntimeError, ImportError, sqlite3.Error) as err:
             if ctx.params.get("debug"):
                 traceback.print_exc()
-            told = (
-                err.as_typed(self._options(ctx)) if isinstance(err, InputError) else _explained(err)
-            )
-            _say(f"error: {_one_line(told)}")
-            raise typer.Exit(_status(err)) from None
+            own = isinstance(err, InputError)
+            say(f"error: {err.as_typed(self._options(ctx)) if own else explained(err)}")
+            failed = FAILED if isinstance(err, RuntimeError) else USAGE_ERROR
+            raise typer.Exit(getattr(err, "status", failed)) from None
 
     def _options(self, ctx: Any) -> dict[str, str]:
         """Options of the command that was typed, by the names of Python's arguments."""
@@ -86,24 +87,17 @@ class OneLineErrors(TyperGroup):
 
 
 def _misused(err: TyperException) -> typer.Exit:
-    """How a mistyped command ends, which is said; a group without a command shows its help."""
+    """How a mistyped command ends; a group without a command shows its help."""
     message = err.format_message()
     if message.startswith("Usage:"):
         typer.echo(message)
     else:
-        _say(f"error: {_one_line(message).rstrip('.')}; see --help")
+        say(f"error: {message.rstrip('.')}; see --help")
     return typer.Exit(USAGE_ERROR)
 
 
-def _status(err: Exception) -> int:
-    if isinstance(err, Aborted):
-        return err.status
-    return FAILED if isinstance(err, RuntimeError) else USAGE_ERROR
-
-
-def _refuse_empty(arguments: list[str]) -> None:
-    """An empty argument is a variable that was not set; as a path it would be the directory that
-    one is in.
+def _check_none_empty(arguments: list[str]) -> None:
+    """Refuse empty arguments: as a path one would mean the current directory.
 
     Raises:
         InputError: There is one.
@@ -122,7 +116,8 @@ def _values(arguments: list[str]) -> Iterator[tuple[str, str]]:
         yield (option, value) if own else (before, argument)
 
 
-def _explained(err: Exception) -> str:
+def explained(err: Exception) -> str:
+    """What happened and, where the disk or a file refused, what to do about it."""
     if (number := disk_errno(err)) is not None:
         where = getattr(err, "filename", None) or "a file that the command writes"
         cure = "make it writable" if number == errno.EROFS else "make room"
@@ -132,18 +127,11 @@ def _explained(err: Exception) -> str:
         )
     if isinstance(err, OSError) and err.filename is not None:
         return f"{err.filename}: {err.strerror}; choose a place that can be read and written"
-    return _one_line(str(err))
+    return str(err)
 
 
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
-
-
-def _say(line: str) -> None:
-    typer.echo(line, err=True)
-
-
-def _how_to_go_on(arguments: list[str]) -> str:
+def how_to_go_on(arguments: list[str]) -> str:
+    """What a person is told who has interrupted a command that was typed so."""
     from ..run.run import RUN_TOML
 
     again, begun = command(*arguments), True
@@ -154,3 +142,25 @@ def _how_to_go_on(arguments: list[str]) -> str:
     if not begun:
         return f"interrupted before anything was kept; begin again with: {again}"
     return f"interrupted: what has finished is kept; go on with: {again}"
+
+
+def say(line: str) -> None:
+    """Print on stderr, in one line."""
+    typer.echo(" ".join(line.split()), err=True)
+
+
+class _ToStderr(logging.Handler):
+    """Writes to what `sys.stderr` is at the time, which a test or a caller may have replaced."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        print(self.format(record), file=sys.stderr)
+
+
+_TO_STDERR = _ToStderr()
+
+
+def print_notices() -> None:
+    """Print what the package logs; a second call changes nothing."""
+    logger = logging.getLogger(PACKAGE)
+    logger.addHandler(_TO_STDERR)
+    logger.setLevel(logging.INFO)

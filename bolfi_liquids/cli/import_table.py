@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..wording import command
-from .examples import examples
+from .options import examples
 
 EPILOG = examples("import --template columns.toml", "import stir.csv --columns columns.toml")
 

@@ -1,17 +1,162 @@
-"""Options of the commands, in groups that become arguments of one function each."""
+"""How commands declare their options: settings whose fields are options, and options shared."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import inspect
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import MISSING, fields, is_dataclass
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import typer
+from pydantic.fields import FieldInfo
 
-from ..inputs.settings import CalibrationSettings
-from .grouped import setting
+from ..inputs.settings import CalibrationSettings, checked, helped
 
 if TYPE_CHECKING:
+    from ..inference.simulations import Compute
     from ..inputs.pour_table import PourTable
+
+
+def examples(*commands: str, title: str = "For example:", then: str = "") -> str:
+    """An epilog, which stands below a command's help.
+
+    Args:
+        commands: What is typed after the program's name.
+        title: Above them.
+        then: A last paragraph.
+    """
+    # after \b, the lines of a paragraph stay as they are
+    listed = "\n".join(("\b", title, *(f"  bolfi-liquids {command}" for command in commands)))
+    return f"{listed}\n\n{then}".rstrip()
+
+
+def grouped(command: Callable[..., Any]) -> Callable[..., Any]:
+    """A command whose parameters that are settings become one option for each field.
+
+    Typer reads a function's signature; this one is flat, so that `--help` lists the fields in
+    the place of the parameter. Settings check their values by their own rules.
+
+    Args:
+        command: Its dataclasses were made by `inputs.settings.checked`; no two fields or
+            parameters have one name.
+    """
+    hints = get_type_hints(command, include_extras=True)
+    groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
+    flat: list[inspect.Parameter] = []
+    for name, parameter in inspect.signature(command).parameters.items():
+        own = parameter.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
+        flat += _of_fields(groups[name]) if name in groups else [own]
+
+    @wraps(command)
+    def run(**given: Any) -> Any:
+        made = {
+            name: group(**{field.name: given.pop(field.name) for field in fields(group)})
+            for name, group in groups.items()
+        }
+        return command(**given, **made)
+
+    run.__signature__ = inspect.Signature(flat)  # type: ignore[attr-defined]
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in flat}
+    del run.__wrapped__  # type: ignore[attr-defined]  # whose signature would be read
+    return run
+
+
+def _of_fields(settings: Any) -> list[inspect.Parameter]:
+    """An option for each field."""
+    return [
+        inspect.Parameter(
+            field.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=inspect.Parameter.empty if field.default is MISSING else field.default,
+            annotation=_typed(_declared(settings, field.name)),
+        )
+        for field in fields(settings)
+    ]
+
+
+def _declared(settings: Any, name: str) -> FieldInfo:
+    return settings.__pydantic_fields__[name]
+
+
+def _typed(field: FieldInfo) -> Any:
+    """Typer's annotation of a setting: several names are one option that is repeated."""
+    kind: Any = field.annotation
+    if kind == tuple[str, ...] | None:
+        return Annotated[list[str] | None, typer.Option(help=field.description)]
+    if get_origin(kind) is Literal:
+        choices = "|".join(get_args(kind))
+        return Annotated[str, typer.Option(metavar=choices, help=field.description)]
+    return Annotated[kind, typer.Option(help=field.description)]
+
+
+def typed_options(ctx: typer.Context) -> list[str]:
+    """The options that were typed, whatever their values."""
+    return [
+        parameter.opts[0]
+        for parameter in ctx.command.params
+        if parameter.opts[0].startswith("--")
+        and getattr(ctx.get_parameter_source(str(parameter.name)), "name", "") == "COMMANDLINE"
+    ]
+
+
+def check_needed(ctx: typer.Context, needed: str, *options: str) -> None:
+    """Refuse options that were typed without the one that gives them a meaning."""
+    typed = typed_options(ctx)
+    for option in options:
+        if option in typed and needed not in typed:
+            raise typer.BadParameter(f"{option} needs {needed}, which is missing")
+
+
+def check_one(ctx: typer.Context, one: str, other: str) -> None:
+    """Refuse two options that exclude each other."""
+    if {one, other} <= set(typed_options(ctx)):
+        raise typer.BadParameter(f"{one} and {other} exclude each other: give one")
+
+
+@checked()
+class ComputeOptions:
+    """Where simulations run, and for how long at the most.
+
+    Attributes:
+        workers: Number of processes; 1 is this process, None one for each processor.
+        dask: Address of a Dask scheduler, in place of processes.
+        timeout: Seconds that one simulation may take; None sets no limit.
+    """
+
+    workers: Annotated[int | None, helped("Processes that simulate; 1 is this process.", ge=1)] = 1
+    dask: Annotated[str | None, helped("Address of a Dask scheduler to simulate on.")] = None
+    timeout: Annotated[float | None, helped("Seconds that one simulation may take.", gt=0)] = None
+
+    @contextmanager
+    def opened(self) -> "Iterator[Compute]":
+        """With the executor that `workers` and `dask` name; it is closed afterwards.
+
+        Raises:
+            BadParameter: Both are given.
+            InputError, ValueError, ImportError, ConnectionError: See `run.compute.open_compute`.
+        """
+        from ..run.compute import open_compute, processes
+
+        if self.dask is not None and self.workers not in (None, 1):
+            raise typer.BadParameter("--workers and --dask name two places to simulate: give one")
+        made = processes(self.workers) if self.dask is None else nullcontext(self.dask)
+        with made as workers, open_compute(workers, self.timeout) as compute:
+            yield compute
+
+    @contextmanager
+    def arguments(self) -> "Iterator[dict[str, Any]]":
+        """The same as `executor` and `timeout` of a function."""
+        with self.opened() as compute:
+            yield {"executor": compute.executor, "timeout": compute.timeout}
+
+
+@checked()
+class StudyComputeOptions(ComputeOptions):
+    """Those of the demo or a long study, which take all processors unless told otherwise."""
+
+    workers: Annotated[int | None, helped("Processes that simulate; else all.", ge=1)] = None
+
 
 RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="Directory of a run.")]
 RigOption = Annotated[
@@ -22,11 +167,15 @@ CupsOption = Annotated[
     typer.Option("--cups", metavar="FILE", help="cups.toml; without it, the bundled one."),
 ]
 ParticlesOption = Annotated[
-    int, typer.Option("--particles", help=setting(CalibrationSettings, "particles").description)
+    int, typer.Option("--particles", help=_declared(CalibrationSettings, "particles").description)
 ]
 LiquidOption = Annotated[
     str | None,
     typer.Option("--liquid", metavar="NAME", help="Whose pours count, if the table has several."),
+]
+PoursOption = Annotated[
+    Path | None,
+    typer.Option(metavar="TABLE", help="What pours of the liquid spilled: they count in pour."),
 ]
 BaselineOption = Annotated[
     list[Path] | None,
@@ -35,136 +184,6 @@ BaselineOption = Annotated[
         help="Of any liquid, without an effect: shows the simulator's own error. Repeatable.",
     ),
 ]
-
-
-@dataclass(frozen=True)
-class CalibrationData:
-    """What is learned from besides the recordings: pours of the liquid, and clean recordings."""
-
-    pours: Annotated[
-        Path | None,
-        typer.Option(metavar="TABLE", help="What pours of the liquid spilled: they count in pour."),
-    ] = None
-    liquid: LiquidOption = None
-    cups: CupsOption = None
-    baseline: BaselineOption = None
-
-    def __post_init__(self) -> None:
-        need(self, "pours", "liquid", "cups")
-
-    @property
-    def arguments(self) -> dict[str, Any]:
-        """As `calibrate` takes them."""
-        pours = opened_pours(self.pours, self.liquid)
-        return {"pours": pours, "cups": self.cups, "baseline": self.baseline or ()}
-
-
-@dataclass(frozen=True)
-class CriticismData(CalibrationData):
-    """The same, and what nothing is fitted to."""
-
-    held_out: Annotated[
-        list[Path] | None,
-        typer.Option(metavar="RECORDING", help="Same liquid, other path or speed: the proof."),
-    ] = None
-    held_out_pours: Annotated[
-        Path | None, typer.Option(metavar="TABLE", help="Other pours of the liquid: the proof.")
-    ] = None
-
-    def __post_init__(self) -> None:
-        need(self, "pours", "liquid", "cups", "held_out_pours")
-
-    @property
-    def arguments(self) -> dict[str, Any]:
-        """As `criticise` takes them."""
-        held_out_pours = opened_pours(self.held_out_pours, self.liquid)
-        unseen = {"held_out": self.held_out or (), "held_out_pours": held_out_pours}
-        return super().arguments | unseen
-
-
-@dataclass(frozen=True)
-class PourOptions:
-    """Cups, pours that were made, and whether a bad fit may be poured."""
-
-    cups: CupsOption = None
-    given: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="TABLE", help="What pours of the liquid spilled; RUN keeps it for later pours."
-        ),
-    ] = None
-    liquid: LiquidOption = None
-    force: Annotated[
-        bool, typer.Option("--force", help="Choose a pour even though the fit is bad.")
-    ] = False
-
-    def __post_init__(self) -> None:
-        need(self, "given", "liquid")
-
-    @property
-    def arguments(self) -> dict[str, Any]:
-        """As `choose_pour` takes them."""
-        given = opened_pours(self.given, self.liquid)
-        return {"cups": self.cups, "given": given, "force": self.force}
-
-
-@dataclass(frozen=True)
-class ExecutionOptions:
-    """Whether and how a chosen pour is carried out."""
-
-    execute: Annotated[
-        bool, typer.Option("--execute", help="Carry out the pour that RUN has chosen already.")
-    ] = False
-    rig: RigOption = None
-    arm: Annotated[
-        bool, typer.Option("--arm", help="With --execute: move the arm, once a sentence is typed.")
-    ] = False
-    emulator: Annotated[
-        bool, typer.Option("--emulator", help="With --execute: move an emulated arm.")
-    ] = False
-    despite_bad_fit: Annotated[
-        bool,
-        typer.Option("--despite-bad-fit", help="With --arm: though it was chosen over a bad fit."),
-    ] = False
-
-    def __post_init__(self) -> None:
-        need(self, "execute", "arm", "emulator", "rig", "despite_bad_fit")
-        one_arm(self.arm, self.emulator)
-
-
-def need(options: object, needed: str, *names: str) -> None:
-    """Refuse options `names` of a group where the option `needed` was not given.
-
-    Their default is None or False, which nobody can type.
-    """
-    for name in names:
-        value = getattr(options, name)
-        if value is not None and value is not False and not getattr(options, needed):
-            given, missing = as_typed(name, needed)
-            raise typer.BadParameter(f"{given} needs {missing}, which is missing")
-
-
-def one_arm(arm: bool, emulator: bool) -> None:
-    """Refuse a real and an emulated arm together."""
-    if arm and emulator:
-        raise typer.BadParameter("--arm moves a real arm, --emulator an emulated one: give one")
-
-
-def changed(*groups: Any) -> Sequence[str]:
-    """The options in groups that are not the default, as they are typed."""
-    return as_typed(
-        *(
-            name
-            for group in groups
-            for name, value in vars(group).items()
-            if value != getattr(type(group)(), name)
-        )
-    )
-
-
-def as_typed(*names: str) -> Sequence[str]:
-    """The options of fields with these names."""
-    return [f"--{name.replace('_', '-')}" for name in names]
 
 
 def opened_pours(path: Path | None, liquid: str | None) -> "PourTable | None":

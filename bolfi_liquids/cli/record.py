@@ -3,102 +3,47 @@
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import InputError
 from ..online.settings import OnlineSettings
 from ..wording import command
-from .errors import FAILED, INTERRUPTED, Aborted
-from .examples import examples
-from .grouped import grouped
-from .options import ExecutionOptions, RigOption, need, one_arm
+from .errors import ABORTED, FAILED, INTERRUPTED, Aborted
+from .options import CupsOption, RigOption, check_needed, check_one, examples
 
 if TYPE_CHECKING:
     from ..hardware import Check
-    from ..online.online import OnlineChoice
 
-OUT = Path("runs/recording")
 EPILOG = examples(
     "record --emulator --out runs/stir",
     "record --rig rig.toml --out runs/stir --arm",
 )
 
 
-@dataclass(frozen=True)
-class ArmOptions:
-    """What moves: nothing, a real arm, or an emulated one with a liquid."""
-
+def record(  # noqa: PLR0913  an option each
+    ctx: typer.Context,
     arm: Annotated[
         bool, typer.Option("--arm", help="Move the arm, once a typed sentence allows it.")
-    ] = False
+    ] = False,
     emulator: Annotated[
         bool, typer.Option("--emulator", help="All of it with an emulated arm and cameras.")
-    ] = False
-    viscosity: Annotated[
-        float | None, typer.Option(help="Of the emulated liquid [Pa s]; else 1.")
-    ] = None
-
-    def __post_init__(self) -> None:
-        one_arm(self.arm, self.emulator)
-        need(self, "emulator", "viscosity")
-
-    @property
-    def arguments(self) -> dict[str, Any]:
-        """Who is asked and what is emulated, as `record` takes them."""
-        from ..hardware import HiddenLiquid
-
-        emulate = (
-            self.emulator if self.viscosity is None else HiddenLiquid(viscosity=self.viscosity)
-        )
-        return {"ask": typed_sentence if self.arm else None, "emulate": emulate}
-
-
-@dataclass(frozen=True)
-class OnlineOptions:
-    """Whether to calibrate while stirring, and for which pour."""
-
+    ] = False,
+    viscosity: Annotated[float, typer.Option(help="Of the emulated liquid [Pa s].")] = 1.0,
     calibrate: Annotated[
         Path | None,
         typer.Option(metavar="RUN", help="Calibrate while stirring, and stop when it is enough."),
-    ] = None
-    cups: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="cups.toml of the pour, for --calibrate.")
-    ] = None
+    ] = None,
+    cups: CupsOption = None,
     target: Annotated[
-        float | None,
-        typer.Option(
-            help="Spilled share at which stirring may end, for --calibrate; "
-            f"else {OnlineSettings.target:g}."
-        ),
-    ] = None
-
-    def __post_init__(self) -> None:
-        need(self, "calibrate", "cups", "target")
-
-    def choice(self, cycles: int | None) -> "OnlineChoice | None":
-        """What to calibrate, with so many cycles at the most; None for nothing."""
-        from ..inputs.cups import cups_of
-        from ..online.online import USUAL_CYCLES, OnlineChoice
-
-        if self.calibrate is None:
-            return None
-        settings = OnlineSettings() if self.target is None else OnlineSettings(target=self.target)
-        cycles = USUAL_CYCLES if cycles is None else cycles
-        return OnlineChoice(self.calibrate, cups_of(self.cups), settings, cycles=cycles)
-
-
-@grouped
-def record(
-    moved: ArmOptions,
-    online: OnlineOptions,
+        float, typer.Option(help="With --calibrate: spilled share at which stirring may end.")
+    ] = OnlineSettings.target,
     rig: RigOption = None,
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Directory of the recording; new or empty.")
-    ] = OUT,
+    ] = Path("runs/recording"),
     cycles: Annotated[
         int | None, typer.Option(help="How often the star is stirred; else as in rig.toml.")
     ] = None,
@@ -109,31 +54,44 @@ def record(
     """
     from ..calibration.result import Calibration
     from ..inputs.rigs import rig_of
-    from ..online.record import record_online
     from ..reporting.warnings import Results
     from ..robot.record import dry_stir
-    from ..robot.record import record as run_record
     from .printed import print_calibration, print_next, print_recording, print_warnings
 
+    check_one(ctx, "--arm", "--emulator")
+    check_needed(ctx, "--emulator", "--viscosity")
+    check_needed(ctx, "--calibrate", "--cups", "--target")
     opened = rig_of(rig)
-    if not (moved.arm or moved.emulator):
+    if not (arm or emulator):
         _tell_dry(*dry_stir(opened, cycles, out))
         return
-    choice = online.choice(cycles)
+    from ..hardware import HiddenLiquid
+    from ..inputs.cups import cups_of
+    from ..online.online import USUAL_CYCLES, OnlineChoice
+    from ..online.record import record_online
+    from ..robot.record import record as run_record
+
+    moved = {
+        "ask": typed_sentence if arm else None,
+        "emulate": HiddenLiquid(viscosity=viscosity) if emulator else False,
+    }
     with aborted_is_told():
-        if choice is None:
-            recording = run_record(opened, cycles=cycles, out=out, **moved.arguments)
+        if calibrate is None:
+            recording = run_record(opened, cycles=cycles, out=out, **moved)
         else:
-            recording = record_online(opened, online=choice, out=out, **moved.arguments)
+            settings = OnlineSettings(target=target)
+            most = USUAL_CYCLES if cycles is None else cycles
+            choice = OnlineChoice(calibrate, cups_of(cups), settings, cycles=most)
+            recording = record_online(opened, online=choice, out=out, **moved)
     print_recording(recording)
-    if online.calibrate is not None:
-        calibration = Calibration.open(online.calibrate)
+    if calibrate is not None:
+        calibration = Calibration.open(calibrate)
         print_calibration(calibration)
         print_warnings(Results.of(calibration.run))
     if recording.attrs["status"] == "aborted":
         reason = recording.attrs.get("reason") or "no reason given"
         raise Aborted(f"{recording.path}: the recording was aborted: {reason}")
-    print_next(*next_commands(recording.path, online.calibrate))
+    print_next(*next_commands(recording.path, calibrate))
 
 
 def next_commands(recording: Path, calibrated: Path | None) -> list[str]:
@@ -150,29 +108,25 @@ def aborted_is_told() -> Iterator[None]:
 
     try:
         yield
-    except SessionInterrupted as err:
-        raise Aborted(str(err), INTERRUPTED) from err
-    except SessionStopped as err:
-        raise Aborted(str(err)) from err
+    except (SessionInterrupted, SessionStopped) as err:
+        by_person = isinstance(err, SessionInterrupted)
+        raise Aborted(str(err), INTERRUPTED if by_person else ABORTED) from err
 
 
-def execute(run: Path, how: ExecutionOptions) -> None:
+def execute(
+    run: Path, rig: Path | None, *, arm: bool, emulate: bool, despite_bad_fit: bool
+) -> None:
     """`pour --execute`: a dry run unless armed."""
     from ..inputs.rigs import rig_of
     from ..robot.pour import dry_pour, execute_pour
 
-    opened = rig_of(how.rig)
-    if not (how.arm or how.emulator):
+    opened = rig_of(rig)
+    if not (arm or emulate):
         _tell_dry(*dry_pour(run, opened))
         return
+    ask = typed_sentence if arm else None
     with aborted_is_told():
-        done = execute_pour(
-            run,
-            opened,
-            ask=typed_sentence if how.arm else None,
-            emulate=how.emulator,
-            despite_bad_fit=how.despite_bad_fit,
-        )
+        done = execute_pour(run, opened, ask=ask, emulate=emulate, despite_bad_fit=despite_bad_fit)
     typer.echo(f"poured; what the arm did is in {done}")
 
 

@@ -1,6 +1,5 @@
 """The command group `rig`: the robot and the cameras, before anything is recorded."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -8,29 +7,7 @@ import typer
 
 from ..wording import command
 from .errors import FAILED
-from .examples import examples
-from .grouped import grouped
-from .options import RigOption
-
-
-@dataclass(frozen=True)
-class PictureOptions:
-    """Pictures of a board and of a plumb line, and the lens that they tell."""
-
-    boards: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Pictures of the board; without it, they are taken."),
-    ] = None
-    plumb_line: Annotated[
-        Path | None,
-        typer.Option(metavar="PICTURE", help="Of a thread that hangs; without it, it is taken."),
-    ] = None
-    square: Annotated[float, typer.Option(help="Side of a printed square, in cm.")] = 2.5
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Of the lens; without it, camera_VIEW.json."),
-    ] = None
-
+from .options import RigOption, examples
 
 app = typer.Typer(help="The robot and the cameras.", no_args_is_help=True)
 
@@ -69,9 +46,20 @@ def template(
         "rig calibrate-cameras --rig rig.toml --view xz",
     ),
 )
-@grouped
-def calibrate_cameras(
-    pictures: PictureOptions,
+def calibrate_cameras(  # noqa: PLR0913  an option each
+    boards: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Pictures of the board; without it, they are taken."),
+    ] = None,
+    plumb_line: Annotated[
+        Path | None,
+        typer.Option(metavar="PICTURE", help="Of a thread that hangs; without it, it is taken."),
+    ] = None,
+    square: Annotated[float, typer.Option(help="Side of a printed square, in cm.")] = 2.5,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Of the lens; without it, camera_VIEW.json."),
+    ] = None,
     rig: RigOption = None,
     view: Annotated[str, typer.Option(metavar="xz|yz", help="Which camera.")] = "xz",
     print_board: Annotated[
@@ -84,13 +72,7 @@ def calibrate_cameras(
     if print_board is not None:
         typer.echo(f"{write_board(print_board)}: print it, measure a square, glue it on a plate")
         return
-    told = calibrate_view(
-        rig,
-        view,
-        square=pictures.square / 100,
-        boards=pictures.boards,
-        plumb_line=pictures.plumb_line,
-        out=pictures.out,
-    )
-    for line in told:
+    for line in calibrate_view(
+        rig, view, square=square / 100, boards=boards, plumb_line=plumb_line, out=out
+    ):
         typer.echo(line)

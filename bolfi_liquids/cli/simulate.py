@@ -1,91 +1,51 @@
 """The command group `simulate`: one stir or one pour of a liquid given by numbers."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..inputs.described_liquid import (
-    COHESION,
-    DENSITY,
-    VISCOSITY,
-)
-from .compute import ComputeOptions
-from .examples import examples
-from .grouped import grouped
-from .options import CupsOption, ParticlesOption
+from ..inputs.described_liquid import COHESION, DENSITY, VISCOSITY, read_effects
+from .options import ComputeOptions, CupsOption, ParticlesOption, examples, grouped
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
 app = typer.Typer(help="Simulate one stir or one pour, and look at it.", no_args_is_help=True)
 
-
-@dataclass(frozen=True)
-class LiquidOptions:
-    """A liquid by numbers."""
-
-    viscosity: Annotated[float, typer.Option(help="Of the liquid, in Pa s.")] = VISCOSITY
-    cohesion: Annotated[float, typer.Option(help="Of the liquid, 0 to 1.")] = COHESION
-    effect: Annotated[
-        list[str] | None,
-        typer.Option("--effect", metavar="NAME=VALUE", help="An effect; may be repeated."),
-    ] = None
-    seed: Annotated[int, typer.Option(help="Seed of the particles' first places.")] = 0
-
-    def given(self, scene: str) -> dict[str, Any]:
-        """Arguments of `simulate_stir` and `simulate_pour`."""
-        from ..inputs.described_liquid import read_effects
-
-        return {
-            "viscosity": self.viscosity,
-            "cohesion": self.cohesion,
-            "effects": read_effects(self.effect or (), scene),
-            "seed": self.seed,
-        }
-
-
-@dataclass(frozen=True)
-class FileOptions:
-    """Files that a simulation leaves."""
-
-    movie: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Show it: .mp4, .gif or .webp.")
-    ] = None
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="NC", help="The result; of a stir, a recording without noise."),
-    ] = None
-
-
-@dataclass(frozen=True)
-class ActionOptions:
-    """How a source is turned, and where the receiver stands."""
-
-    angular_velocity: Annotated[
-        float, typer.Option(help="Of the source about its lip, in deg/s.")
-    ] = 60.0
-    distance: Annotated[float, typer.Option(help="From the lip to the receiver's axis, in cm.")] = (
-        3.0
-    )
-    cups: CupsOption = None
+ViscosityOption = Annotated[float, typer.Option(help="Of the liquid, in Pa s.")]
+CohesionOption = Annotated[float, typer.Option(help="Of the liquid, 0 to 1.")]
+EffectOption = Annotated[
+    list[str] | None, typer.Option(metavar="NAME=VALUE", help="An effect; may be repeated.")
+]
+SeedOption = Annotated[int, typer.Option(help="Seed of the particles' first places.")]
+MovieOption = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Show it: .mp4, .gif or .webp.")
+]
+OutOption = Annotated[
+    Path | None,
+    typer.Option(metavar="NC", help="The result; of a stir, a recording without noise."),
+]
 
 
 @app.command(epilog=examples("simulate stir --viscosity 0.1 --movie oil.webp"))
 @grouped
-def stir(
-    liquid: LiquidOptions,
-    files: FileOptions,
+def stir(  # noqa: PLR0913  an option each
     compute: ComputeOptions,
+    viscosity: ViscosityOption = VISCOSITY,
+    cohesion: CohesionOption = COHESION,
     density: Annotated[
         float | None, typer.Option(help="Of the liquid, in kg/m³; else the recording's.")
     ] = None,
+    effect: EffectOption = None,
+    seed: SeedOption = 0,
     particles: ParticlesOption = 0,
     recording: Annotated[
         Path | None,
         typer.Option(metavar="NC", help="Whose path and rig are used; else a bundled one."),
     ] = None,
+    movie: MovieOption = None,
+    out: OutOption = None,
 ) -> None:
     """Stir a liquid along a recorded path.
 
@@ -98,21 +58,28 @@ def stir(
 
     with compute.arguments() as where:
         made = simulate_stir(
-            **liquid.given("stir"),
+            viscosity,
+            cohesion,
             density=density,
-            particles=particles,
+            effects=read_effects(effect or (), "stir"),
             recording=recording,
+            particles=particles,
+            seed=seed,
+            movie=movie,
+            out=out,
             **where,
-            movie=files.movie,
-            out=files.out,
         )
-    seconds = float(made["time"][-1])
-    _tell(made, f"path of {made.attrs['path_of']}, {seconds:.1f} s")
-    xz, yz = (
-        np.degrees(np.abs(made[f"inclination_{plane}"]).max().item()) for plane in ("xz", "yz")
+    largest = (
+        f"{np.degrees(np.abs(made[f'inclination_{plane}']).max().item()):.2f} deg in {plane}"
+        for plane in ("xz", "yz")
     )
-    typer.echo(f"largest inclination: {xz:.2f} deg in xz, {yz:.2f} deg in yz")
-    _tell_files(files)
+    _tell(
+        made,
+        f"path of {made.attrs['path_of']}, {float(made['time'][-1]):.1f} s",
+        f"largest inclination: {', '.join(largest)}",
+        movie=movie,
+        file=out,
+    )
 
 
 @app.command(
@@ -121,13 +88,23 @@ def stir(
     )
 )
 @grouped
-def pour(
-    liquid: LiquidOptions,
-    action: ActionOptions,
-    files: FileOptions,
+def pour(  # noqa: PLR0913  an option each
     compute: ComputeOptions,
+    viscosity: ViscosityOption = VISCOSITY,
+    cohesion: CohesionOption = COHESION,
     density: Annotated[float, typer.Option(help="Of the liquid, in kg/m³.")] = DENSITY,
+    effect: EffectOption = None,
+    seed: SeedOption = 0,
     particles: ParticlesOption = 0,
+    angular_velocity: Annotated[
+        float, typer.Option(help="Of the source about its lip, in deg/s.")
+    ] = 60.0,
+    distance: Annotated[
+        float, typer.Option(help="From the lip to the receiver's axis, in cm.")
+    ] = 3.0,
+    cups: CupsOption = None,
+    movie: MovieOption = None,
+    out: OutOption = None,
 ) -> None:
     """Pour a liquid from one cup into another.
 
@@ -141,34 +118,33 @@ def pour(
 
     with compute.arguments() as where:
         made = simulate_pour(
-            **liquid.given("pour"),
-            angular_velocity=float(np.radians(action.angular_velocity)),
-            distance=action.distance / 100.0,
+            viscosity,
+            cohesion,
+            angular_velocity=float(np.radians(angular_velocity)),
+            distance=distance / 100.0,
             density=density,
-            cups=action.cups,
+            effects=read_effects(effect or (), "pour"),
+            cups=cups,
             particles=particles,
+            seed=seed,
+            movie=movie,
+            out=out,
             **where,
-            movie=files.movie,
-            out=files.out,
         )
-    _tell(made, f"{action.angular_velocity:g} deg/s, lip to axis {action.distance:g} cm")
-    typer.echo(", ".join(f"{name} {made[name].item():.1%}" for name in FRACTIONS))
-    _tell_files(files)
+    _tell(
+        made,
+        f"{angular_velocity:g} deg/s, lip to axis {distance:g} cm",
+        ", ".join(f"{name} {made[name].item():.1%}" for name in FRACTIONS),
+        movie=movie,
+        file=out,
+    )
 
 
-def _tell(made: "Dataset", how: str) -> None:
-    """The liquid that was simulated, and how."""
-    import json
+def _tell(made: "Dataset", *lines: str, **files: Path | None) -> None:
+    """The liquid that was simulated, how, what came of it, and the files that hold it."""
+    from ..simulation.simulate import described
 
-    from ..inputs.described_liquid import Described
-
-    numbers = (float(made.attrs[name]) for name in ("viscosity", "cohesion", "liquid_density"))
-    effects, particles, seed = (made.attrs[name] for name in ("effects", "particles", "seed"))
-    liquid = Described(*numbers, effects=json.loads(effects), particles=particles, seed=seed)
-    typer.echo("\n".join([*liquid.lines(), how]))
-
-
-def _tell_files(files: FileOptions) -> None:
-    for name, path in (("movie", files.movie), ("file", files.out)):
+    typer.echo("\n".join([*described(made).lines(), *lines]))
+    for name, path in files.items():
         if path is not None:
             typer.echo(f"{name}: {path}")

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..wording import command
-from .examples import examples
+from .options import examples
 
 EPILOG = examples("trim stir.nc", "trim stir.nc --start 4.2 --stop 11 --out cut.nc")
 

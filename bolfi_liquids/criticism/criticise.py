@@ -133,7 +133,7 @@ def _find(
     }
     found = {"stirs": _stirs(calibration, inputs, clean, how | {"report": report})}
     if inputs.table is not None:
-        how["report"] = lambda phase, n: report(f"pours, {phase}", n)
+        how["report"] = lambda phase, *counts: report(f"pours, {phase}", *counts)
         found["pours"] = _pours(calibration.prior, found["stirs"], inputs, inputs.table, how)
     return found, sum(one.simulations for one in clean)
 

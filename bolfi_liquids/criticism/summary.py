@@ -12,7 +12,7 @@ from ..calibration.summary import ParameterSummary
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..inputs.frame import named_faults
 from ..inputs.settings import FALSE_ALARM_RATE
-from ..run.summary import Number, Section
+from ..run.results import Number, Section
 from .criticism_file import best_of
 
 if TYPE_CHECKING:

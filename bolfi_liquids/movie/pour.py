@@ -1,20 +1,27 @@
 """Pictures of a pour."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .landed_liquid import landed, level
-from .light import through_liquid
-from .solids import Shape, drawn, glass_before, glass_behind, ring, room
-from .surface import Glass, surface
-from .text import written
-from .view import OrthographicView
+from .rendering import (
+    Glass,
+    OrthographicView,
+    Shape,
+    drawn,
+    glass_before,
+    glass_behind,
+    ring,
+    room,
+    surface,
+    through_liquid,
+    written,
+)
 
 if TYPE_CHECKING:
-    from ..models import Cups, PourFrames
+    from ..models import Cups, Landings, PourFrames
 
 PICTURE_SIZE = 480, 640
 AZIMUTH, ELEVATION = np.radians(12.0), np.radians(14.0)
@@ -23,6 +30,7 @@ PUDDLE_CELL = 0.004  # m between places where liquid lies
 CAPTION_HEIGHT = 0.09  # share of the picture's height that is left free for the caption
 DYED, SHINING, SPILLED = (38, 92, 190, 215), (92, 160, 226, 235), (70, 150, 235, 190)
 UP = np.array([0.0, 0.0, 1.0])
+GRAVITY = 9.81
 
 
 def source_glass(cups: "Cups", angle: float) -> Glass:
@@ -108,3 +116,59 @@ def _puddle(spilled: NDArray, cups: "Cups") -> list[Shape]:
     turn = np.linspace(0.0, 2.0 * np.pi, 25)
     disc = PUDDLE_SPREAD * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
     return [Shape(centre + disc, SPILLED) for centre in np.column_stack([centres, table])]
+
+
+class Landed(NamedTuple):
+    """Of one frame.
+
+    Attributes:
+        falling: Particles between the rim and where they come to rest [m], shape [m, 3].
+        caught: Fraction of all liquid that is in the receiver.
+        spilled: Where the others lie on the table [m], shape [k, 2].
+    """
+
+    falling: NDArray[np.float64]
+    caught: float
+    spilled: NDArray[np.float64]
+
+
+def landed(
+    landings: "Landings", before: int, count: int, interval: float, cups: "Cups", distance: float
+) -> Landed:
+    """What has become of the first `count` particles that passed the rim, of one pour.
+
+    The simulation ends at the rim. From there each falls as a stone that left the lip at rest
+    upright and reached the rim where it did; those of the last interval passed it one after
+    another.
+
+    Args:
+        landings: Of all particles, in the order in which they pass the rim.
+        before: How many had passed it one frame ago.
+        count: How many have now.
+        interval: Between the two frames [s].
+        cups: The cups.
+        distance: From the lip to the receiver's axis [m].
+    """
+    drop, rim = cups.pour.lip_height - cups.receiver.height, cups.receiver.height
+    passed = np.asarray(landings.position[0, :count], np.float64)
+    inside = landings.inside(distance, cups.receiver.radius)[0, :count]
+    age = np.full(count, np.inf)
+    fresh = count - before
+    age[before:] = interval * (1.0 - (np.arange(fresh) + 0.5) / max(fresh, 1))
+    speed = np.sqrt(2.0 * GRAVITY * drop)
+    since = np.minimum(age, (np.sqrt(2.0 * GRAVITY * (drop + rim)) - speed) / GRAVITY)
+    # the time of the fall to the rim gives the speed at which it went ahead
+    ahead = passed[:, 0] * (1.0 + np.where(inside, 0.0, since * GRAVITY / speed))
+    caught = float(inside.sum() / landings.position.shape[1])
+    height = rim - since * (speed + GRAVITY * since / 2.0)
+    rest = np.where(inside, level(caught, cups), 0.0)
+    flying = height > rest + 1e-9
+    world = np.stack([ahead, passed[:, 1], height - cups.pour.lip_height], axis=1)
+    lying = ~inside & ~flying
+    return Landed(world[flying], caught, world[lying, :2])
+
+
+def level(caught: float, cups: "Cups") -> float:
+    """Depth of the liquid in the receiver [m], at most the receiver's height."""
+    depth = caught * cups.liquid_volume / (np.pi * cups.receiver.radius**2)
+    return min(depth, cups.receiver.height)

@@ -6,11 +6,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .light import through_liquid
-from .solids import drawn, glass_before, glass_behind, room, stick_layer
-from .surface import Glass, surface
-from .text import written
-from .view import OrthographicView
+from .rendering import (
+    Glass,
+    OrthographicView,
+    drawn,
+    glass_before,
+    glass_behind,
+    room,
+    stick_layer,
+    surface,
+    through_liquid,
+    written,
+)
 
 if TYPE_CHECKING:
     from ..models import StirFrames, StirSetup

@@ -30,9 +30,8 @@ from ..pouring.design import joint_prior, whole
 from ..pouring.landed_pours import Parcels, pours_in
 from ..pouring.landing_map import LandingMap, learn_map
 from ..progress import progress_bar
-from ..run.lock import alone_in
-from ..run.run import RUN_TOML
-from ..run.workers import background_process
+from ..run.compute import background_process
+from ..run.run import RUN_TOML, alone_in
 from ..simulators import PourSimulator, stir_simulator
 from .estimate import Made, OnlineEstimate, Problem, answer, design, proposals, simulate_plan
 from .plan import Aligned, PartialRecording, stroke_ends

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..progress import Advance, silent
-from ..run.summary import Number
+from ..run.results import Number
 from ..seeds import Phase, simulation_seeds
 from ..simulators import RATE, BatchOf, PourSimulator
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ..calibration.summary import FitStatus
 from ..inputs.settings import PourSettings
+from ..run.results import Number, Section
 from ..run.run import Run, RunOrPath
-from ..run.summary import Number, Section
 from ..wording import html_table, spilled
 from .draining import Hold
 from .spillage import ACTION, FRACTIONS

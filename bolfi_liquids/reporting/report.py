@@ -60,6 +60,7 @@ def report(
     """
     with Run.entered(run) as opened, open_compute(executor, timeout) as compute:
         results = Results.of(opened)
+        opened.tell_missing_bank()
         facts = results.facts
         for notice in results.outdated:
             logger.warning(notice)

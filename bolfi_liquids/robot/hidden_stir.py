@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.described_liquid import COHESION
 from ..inputs.recording import planned_recording
-from ..simulation.batch import batch_of, simulated
+from ..simulation.simulate import described_liquids, simulated
 from ..simulators import stir_simulator
 from .stir import StirPlan
 
@@ -39,10 +39,10 @@ def with_stir(rig: "Rig", plan: StirPlan, liquid: "HiddenLiquid") -> "HiddenLiqu
         return liquid
     path = servoed(joined(list(plan.strokes)))
     expected = planned_recording(path.time, path.position, rig_attributes(rig))
-    of = {"viscosity": liquid.viscosity, "cohesion": COHESION, "density": rig.liquid.density}
+    of = {"viscosity": liquid.viscosity, "cohesion": COHESION, "seed": liquid.seed}
     try:
-        batch = batch_of(of, {}, 0, liquid.seed)
-        (inclination,) = simulated(stir_simulator([expected], 0), batch, Compute())
+        liquids = described_liquids(of, density=rig.liquid.density)
+        (inclination,) = simulated(stir_simulator([expected], 0), liquids, Compute())
         if not np.isfinite(inclination).all():
             raise RuntimeError("its result is not finite")
     except InputError as err:

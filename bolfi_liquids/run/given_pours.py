@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs.pour_table import PourTable
-from .result_file import read_result, write_result
+from .results import read_result, write_result
 
 if TYPE_CHECKING:
     from xarray import Dataset

@@ -5,12 +5,14 @@ finished simulation. Each step's result is a tree that records what it was made 
 while the run holds the same, and None otherwise.
 """
 
+import fcntl
 import json
 import logging
+import os
 import sqlite3
 import tomllib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from difflib import get_close_matches
 from functools import cached_property
@@ -21,17 +23,14 @@ from typing import TYPE_CHECKING, Any, Protocol
 import tomli_w
 
 from ..errors import Argument, InputError
-from ..files import as_path, write_text
+from ..files import as_path, existing_file, write_text, write_whole
+from ..inputs.open import read_fields
 from ..inputs.prior import read_prior
-from ..inputs.recording import Recording
+from ..inputs.recording import Recording, as_recording
 from ..inputs.settings import CalibrationSettings, CriticismSettings, PourSettings
 from ..wording import command
 from .given_pours import GIVEN_POURS, digest_of_pours
-from .lock import alone_in
-from .provenance import generations
-from .recordings import RECORDINGS_FOLDER, kept_paths, kept_recordings
-from .result_file import read_result, write_result
-from .summary import SUMMARY_FILE, write_summary
+from .results import SUMMARY_FILE, generations, read_result, write_result, write_summary
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -40,7 +39,9 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
+LOCK = "run.lock"
 RUN_TOML = "run.toml"
+RECORDINGS = "recordings"
 SIMULATIONS = "simulations.sqlite"
 MOVING = "moving"
 REPORT = "report.html"
@@ -51,7 +52,7 @@ RESULTS = {
 }
 """File of each step's result, in the order of the steps."""
 
-OWN_FILES = (SIMULATIONS, *RESULTS.values(), GIVEN_POURS, RECORDINGS_FOLDER, MOVING, REPORT)
+OWN_FILES = (SIMULATIONS, *RESULTS.values(), GIVEN_POURS, RECORDINGS, MOVING, REPORT)
 """What only a run may hold."""
 
 MUST_AGREE = ("settings", "inputs", "simulator", "engine")
@@ -65,6 +66,10 @@ ABSENT = {
     "criticise": "the calibration in it was not criticised",
     "pour": "no pour was chosen",
 }
+
+
+MAX_LETTERS = 60
+"""Of a name, each of at most four bytes: a copy's name must fit into the 255 bytes of a file's."""
 
 
 class HasRun(Protocol):
@@ -89,6 +94,44 @@ def run_path(given: RunOrPath) -> Path:
     return as_path(getattr(given, "path", given), Argument("run"))
 
 
+@contextmanager
+def alone_in(directory: Path) -> Iterator[None]:
+    """Keep other commands out of a directory, which is made if it is missing.
+
+    The kernel releases the lock when the process ends; the empty file remains. It is not
+    re-entrant. A directory that is read-only, or on a disk without locks, is not locked.
+
+    Raises:
+        InputError: Another command works there, or it is no directory.
+    """
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError) as err:
+        fix = "choose another directory"
+        raise InputError("not a directory", where=str(directory), fix=fix) from err
+    if not os.access(directory, os.W_OK):
+        yield
+        return
+    flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW  # a link may lead to somebody else's file
+    lock = os.open(directory / LOCK, flags, 0o666)
+    try:
+        with suppress(OSError):
+            os.fchmod(lock, 0o666)  # others of the group may work here next, whatever the umask
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(
+                "another command works in it",
+                where=str(directory),
+                fix="wait until it has ended, or choose another directory",
+            ) from None
+        except OSError:
+            pass  # a disk without locks
+        yield
+    finally:
+        os.close(lock)
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """A run, whose results are looked for when they are asked for.
@@ -110,9 +153,6 @@ class Run:
                 it.
         """
         run = cls(path := run_path(given), _read(path))
-        if missing := [name for name in SECTIONS if not run.record.get(name)]:
-            what = f"is cut off: it has no {missing[0]}"
-            raise InputError(what, where=str(path / RUN_TOML), fix="restore the file")
         run._check_generation()
         return run
 
@@ -124,7 +164,7 @@ class Run:
         Raises:
             InputError: There is none, or another command works in it.
         """
-        _read(run_path(given))  # before a mistyped name becomes a directory
+        _record_of(run_path(given))  # before a mistyped name becomes a directory
         with alone_in(run_path(given)):
             yield cls.open(given)
 
@@ -157,6 +197,7 @@ class Run:
                     raise InputError("holds a run already", where=str(path), fix=fix)
                 run = cls(path, cls.open(path)._continued(record, growing))
                 run.write_summary()  # a killed command may not have come to it
+                run.tell_missing_bank()
             else:
                 _check_no_results(path)
                 _write(path, record)
@@ -182,26 +223,58 @@ class Run:
             own = f"resume with the run's own value of `{field.rpartition('.')[2]}`"
             larger = " or a larger one" if field == growing else ""
             raise InputError(
-                f"{field} is {held!r} in the run, but {asked!r} was asked",
+                f"{field} is {held!r:.80} in the run, but {asked!r:.80} was asked",
                 where=str(self.path / RUN_TOML),
                 fix=f"{own}{larger}, or choose another `out`",
             )
         first = {"created": self.record["created"]} if "created" in self.record else {}
         return {**wanted, **first} if grows else self.record
 
+    @property
+    def _copies(self) -> list[Path]:
+        """Where the run keeps its recordings, so that it can be criticised wherever it was moved:
+        numbered in their order, by the end of a long name."""
+        names = enumerate(self.record.get("files", {}).get("recordings", ()), start=1)
+        return [self.path / RECORDINGS / f"{at}-{name[-MAX_LETTERS:]}" for at, name in names]
+
+    def keep_recordings(self, recordings: Sequence[Recording]) -> None:
+        """Copy the files, byte for byte."""
+        (self.path / RECORDINGS).mkdir(exist_ok=True)
+        for copy, recording in zip(self._copies, recordings, strict=True):
+            if not copy.exists() or sha256(copy.read_bytes()).hexdigest() != recording.hash:
+                content = recording.path.read_bytes()
+                write_whole(copy, lambda path, content=content: path.write_bytes(content))
+
     @cached_property
     def recordings(self) -> list[Recording]:
-        """Copies of the calibrated recordings.
+        """Those that were calibrated on, from the run's copies.
 
         Raises:
             InputError: A copy is missing, or is another recording.
         """
-        return kept_recordings(self.path, self.record)
+        opened, digests = [], self.record["inputs"]["sha256"]
+        for path, digest in zip(self._copies, digests, strict=True):
+            content = existing_file(path).read_bytes()
+            if sha256(content).hexdigest() != digest:
+                raise InputError(
+                    "is not the recording that this run was calibrated on",
+                    where=str(path),
+                    fix="put the original back, or calibrate again",
+                )
+            # with these bytes it has been checked
+            opened.append(as_recording(read_fields(content, path), path, content))
+        return opened
 
     @cached_property
     def prior(self) -> "Prior":
         """Of the parameters, before stirring."""
         return read_prior(self.record["settings"]["prior"])
+
+    def tell_missing_bank(self) -> None:
+        """Log that the simulations of a finished calibration were removed, if they were."""
+        path = self.path / SIMULATIONS
+        if not path.exists() and (self.path / RESULTS["calibrate"]).exists():
+            logger.warning("%s is missing: what needs its simulations makes them again", path)
 
     @contextmanager
     def bank(self) -> "Iterator[SimulationBank]":
@@ -214,8 +287,7 @@ class Run:
         from ..inference import SimulationBank
 
         path = self.path / SIMULATIONS
-        if not path.exists() and (self.path / RESULTS["calibrate"]).exists():
-            logger.warning("%s is missing: its simulations are made again", path)
+        self.tell_missing_bank()
         try:
             bank = SimulationBank(path)
         except (ValueError, sqlite3.Error) as err:
@@ -312,9 +384,9 @@ class Run:
 
     def _calibrate_again(self, *words: object) -> str:
         """The command that calibrates on the kept recordings, with the settings of the run."""
-        recordings = kept_paths(self.path, self.record) or ("RECORDING...",)
+        copies = [path for path in self._copies if path.is_file()]
         options = _options(self.record.get("settings", {}), asdict(CalibrationSettings()))
-        return command("calibrate", *recordings, *words, *options)
+        return command("calibrate", *(copies or ["RECORDING..."]), *words, *options)
 
     def _look(self, step: str) -> "tuple[DataTree | None, str]":
         """A step's current result, or why there is none."""
@@ -354,20 +426,17 @@ class Run:
             InputError: Versions differ; the message has the command that calibrates anew.
         """
         now, simulators = generations(), self.record.get("simulator", {}).values()
-        held = {
-            "model": {str(one.get("model")) for one in simulators if "model" in one},
-            "engine": {str(one) for one in [self.record.get("engine", {}).get("version")] if one},
-        }
-        for part, versions in held.items():
-            if not versions <= {str(now[part])}:
-                if "files" not in self.record:  # of a check
-                    what, fix = f"was made by another {part}", "choose another `out`"
-                    raise InputError(what, where=str(self.path), fix=fix)
-                anew = self.path.with_name(f"{self.path.name}_{part}_{now[part]}")
+        made_by = [("model", one["model"]) for one in simulators if "model" in one]
+        if engine := self.record.get("engine", {}).get("version"):
+            made_by.append(("engine", engine))
+        for part, version in made_by:
+            if version != now[part]:
+                anew = _beside(self.path, f"{part}_{now[part]}")
+                again = f"calibrate again: {self._calibrate_again('--out', anew)}"
                 raise InputError(
-                    f"was made by {part} {', '.join(sorted(versions))}, and this is {now[part]}",
+                    f"was made by {part} {version}, and this is {now[part]}",
                     where=str(self.path),
-                    fix=f"calibrate again: {self._calibrate_again('--out', anew)}",
+                    fix=again if "files" in self.record else "choose another `out`",  # a check's
                 )
 
 
@@ -406,7 +475,9 @@ def check_resumable(path: Path) -> None:
     near = _run_near(path)
     fix = f"did you mean {near}? To begin" if near else "to begin"
     raise InputError(
-        "holds no run to resume", where=str(path), fix=f"{fix} a new run, leave --resume out"
+        "holds no run to resume",
+        where=str(path),
+        fix=_way_out(path) or f"{fix} a new run, leave --resume out",
     )
 
 
@@ -419,23 +490,49 @@ def _run_near(path: Path) -> Path | None:
     return next((beside[name] for name in get_close_matches(path.name, beside, n=1)), None)
 
 
+def _record_of(path: Path) -> Path:
+    """The file of a run's settings.
+
+    Raises:
+        InputError: There is none.
+    """
+    if not (path / RUN_TOML).is_file():
+        usual = "give the directory of a run, as made by: bolfi-liquids calibrate ... --out RUN"
+        raise InputError(f"no {RUN_TOML} in it", where=str(path), fix=_way_out(path) or usual)
+    return path / RUN_TOML
+
+
 def _read(path: Path) -> dict[str, Any]:
     """run.toml.
 
     Raises:
-        InputError: There is none, or it is not TOML.
+        InputError: There is none, it is not TOML, or it was cut off.
     """
-    file = path / RUN_TOML
-    if not file.is_file():
-        raise InputError(
-            f"no {RUN_TOML} in it",
-            where=str(path),
-            fix="give the directory of a run, as made by: bolfi-liquids calibrate ... --out RUN",
-        )
+    file, record = _record_of(path), {}
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        record = tomllib.loads(file.read_text(encoding="utf-8"))
+        missing = [name for name in SECTIONS if not record.get(name)]
+        fault = f"is cut off: it has no {missing[0]}" if missing else ""
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as err:
-        raise InputError(f"not TOML ({err})", where=str(file), fix="restore the file") from err
+        fault = f"not TOML ({err})"
+    if fault:
+        fix = ", or ".join(["restore the file", *filter(None, [_way_out(path)])])
+        raise InputError(fault, where=str(file), fix=fix)
+    return record
+
+
+def _way_out(path: Path) -> str:
+    """What to do where run.toml is lost, but not the recordings; "" where they are, too."""
+    if not (copies := sorted((path / RECORDINGS).glob("*.nc"))):
+        return ""
+    anew = command("calibrate", *copies, "--out", _beside(path, "anew"))
+    return f"calibrate its recordings anew: {anew}"
+
+
+def _beside(path: Path, ending: str) -> Path:
+    """A directory beside a run's, of a name that begins with the run's."""
+    whole = path if path.name else path.absolute()  # "." has no name
+    return whole.with_name(f"{whole.name}_{ending}")
 
 
 def _check_no_results(path: Path) -> None:
@@ -445,7 +542,7 @@ def _check_no_results(path: Path) -> None:
             raise InputError(
                 f"holds {name} without {RUN_TOML}",
                 where=str(path),
-                fix="choose another `out`; nothing was overwritten",
+                fix=_way_out(path) or "choose another `out`; nothing was overwritten",
             )
 
 

@@ -1,6 +1,7 @@
-"""Stirs and pours of liquids that a person describes: numbers, files and movies."""
+"""Stirs and pours of liquids that a person describes, as tables, files and movies."""
 
-from collections.abc import Mapping
+import json
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,34 +10,41 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import Argument, InputError
-from ..files import write_netcdf
+from ..files import given_path, new_file, write_netcdf
+from ..inference.arguments import checked_array
 from ..inputs.bundled import bundled_recording
 from ..inputs.cups import cups_of
 from ..inputs.described_liquid import (
     COHESION,
     DENSITY,
     VISCOSITY,
+    Described,
     check_effects,
     number_of,
 )
-from ..inputs.fields import LENGTHS, STICK_WEIGHT
+from ..inputs.fields import LENGTHS, PLANES, STICK_WEIGHT
 from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import check_distance, check_rate
-from ..inputs.recording import Recording, Trajectory
+from ..inputs.recording import Recording, along_path, planned_recording, recording_dataset
+from ..movie.file import PICTURE_RATE, check_movie, write_movie
+from ..pouring.spillage import FRACTIONS
+from ..progress import progress_bar
 from ..run.compute import open_compute
-from ..simulators import RATE, BatchOf, PourSimulator, StirSimulator
-from .batch import batch_of, simulated
-from .files import check_targets, film_pour, film_stir, pour_dataset, stir_dataset
+from ..simulators import RATE, BatchOf, FluidSimulator, PourSimulator, StirSimulator
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
-    from ..inference.simulations import Workers
+    from ..inference.simulations import Compute, Workers
     from ..models import Cups
     from ..models.trajectory import PivotPath
 
 RIG_SIZES = (*LENGTHS, *STICK_WEIGHT)  # attributes of a recording that may be replaced
 PATTERN_SPEED = 0.1  # m/s, of a star or circle that is given by its name
+OF_THE_ORIGINAL = ("status", "reason")  # attributes of a recording that its simulation lacks
+VARIED = ("viscosity", "cohesion", "seed")  # what may differ between simulations of one call
+Liquids = NDArray[Any]
+"""`Described` liquids, one for each simulation: shape (B,), or () where only numbers were given."""
 
 
 def simulate_stir(  # noqa: PLR0913  the one call that most users make
@@ -88,92 +96,49 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     """
     from ..models import StirSetup
 
-    targets, effects = check_targets(movie, out), check_effects(effects, "stir")
     weighed = None if density is None else number_of(density, Argument("density"))
-    liquid = {"viscosity": viscosity, "cohesion": cohesion}
-    # refused before a file is read
-    batch_of(
-        {**liquid, "density": DENSITY if weighed is None else weighed}, effects, particles, seed
+    liquids = described_liquids(
+        {"viscosity": viscosity, "cohesion": cohesion, "seed": seed},
+        density=DENSITY if weighed is None else weighed,
+        effects=check_effects(effects, "stir"),
+        particles=particles,
     )
+    movie, out = _checked_files(movie, out, liquids)
     (opened,) = open_recordings(bundled_recording("glycerin") if recording is None else recording)
-    if targets.out is not None and targets.out.exists() and targets.out.samefile(opened.path):
-        raise InputError(
-            "is the recording itself", where=str(targets.out), fix="choose another name"
-        )
+    if out is not None and out.exists() and out.samefile(opened.path):
+        raise InputError("is the recording itself", where=str(out), fix="choose another name")
     if weighed is None:
         weighed = opened.number("liquid_density")
-    of_another = _with_rig(opened.attrs, rig) | {"liquid_density": weighed}
-    plan = _planned(replace(opened, attrs=of_another), path)
+    attrs = _with_rig(opened.attrs, rig) | {"liquid_density": weighed}
+    plan = _planned(replace(opened, attrs=attrs), path)
     count = particles or StirSetup.from_recording(plan).particles
-    batch = batch_of({**liquid, "density": weighed}, effects, count, seed)
-    targets.check_single(batch.single)
-    setup = StirSetup.from_recording(plan, particles=batch.one.particles)
+    liquids = _replaced(liquids, density=weighed, particles=count)
+    setup = StirSetup.from_recording(plan, particles=liquids.flat[0].particles)
     simulator = StirSimulator((plan,), (setup,))
     with open_compute(executor, timeout) as compute:
-        angles = simulated(simulator, batch, compute)
-    found = stir_dataset(batch, plan, angles)
-    if targets.out is not None:
-        write_netcdf(found, targets.out)
-    if targets.movie is not None:
-        film_stir(targets.movie, batch.one, simulator, progress)
-    return found
+        angles = simulated(simulator, liquids, compute)
+    kept = {
+        name: value
+        for name, value in plan.attrs.items()
+        if name not in OF_THE_ORIGINAL and not name.startswith("imported_")
+    }
+    planes = {
+        name: (("simulation", "time"), angles[..., plane], {"units": "rad"})
+        for plane, name in enumerate(PLANES)
+    }
+    made = recording_dataset(along_path(plan, angles[0]), kept | {"path_of": plan.path.name})
+    made = _told_apart(made.assign(planes), liquids)
+    if out is not None:
+        write_netcdf(made, out)
+    if movie is not None:
+        from ..movie.stir import stir_pictures
 
-
-def _with_rig(
-    attrs: Mapping[str, float | str], rig: Mapping[str, float] | None
-) -> dict[str, float | str]:
-    """A recording's attributes with those of a rig in their place.
-
-    Raises:
-        InputError: They are no sizes by name, a name is none of `RIG_SIZES`, a value is no positive
-            number, or the stick's mass and density are both given.
-    """
-    if rig is None:
-        return dict(attrs)
-    if not isinstance(rig, Mapping):
-        raise InputError(f"{rig!r:.80}", where=Argument("rig"), fix="give sizes by name")
-    for name, value in rig.items():
-        if name not in RIG_SIZES:
-            fix = f"give some of {', '.join(RIG_SIZES)}"
-            raise InputError(f"{name!r} is no size of a rig", where="rig", fix=fix)
-        if number_of(value, f"rig: {name}") <= 0.0:
-            raise InputError(f"{value!r}", where=f"rig: {name}", fix="give a positive number")
-    weighed = [name for name in STICK_WEIGHT if name in rig]
-    if len(weighed) > 1:
-        raise InputError(f"{' and '.join(weighed)} are given", where="rig", fix="give one of them")
-    replaced = STICK_WEIGHT if weighed else ()
-    return {name: value for name, value in attrs.items() if name not in replaced} | dict(rig)
-
-
-def _planned(recording: Recording, path: "str | PivotPath | None") -> Recording:
-    """The recording with another path."""
-    from ..hardware.motion import circle, star
-
-    if path is None:
-        return recording
-    patterns = {"star": star, "circle": circle}
-    if isinstance(path, str) and path in patterns:
-        height = float(recording.gripper.position[0, 2])
-        name, timed = path, patterns[path](speed=PATTERN_SPEED, height=height)
-    elif not isinstance(path, str) and hasattr(path, "time") and hasattr(path, "position"):
-        name, timed = "path", path
-    else:
-        raise InputError(
-            f"{path!r:.80}",
-            where=Argument("path"),
-            fix="give star, circle, or what hardware.motion.star returns",
-        )
-    gripper = Trajectory(np.asarray(timed.time, np.float64), np.asarray(timed.position, np.float64))
-    unseen = np.full((len(gripper.time), 2), np.nan)
-    named = {key: value for key, value in recording.attrs.items() if key != "speed"}
-    return replace(
-        recording,
-        time=gripper.time,
-        gripper=gripper,
-        inclination=unseen,
-        attrs=named,
-        path=Path(name),
-    )
+        one = liquids.item()
+        frames = simulator.frames(theta_of(one), one.seed, PICTURE_RATE)
+        *liquid, how = one.lines()
+        pictures = stir_pictures(frames, setup, [*liquid, f"{plan.path.name}, {how}"])
+        _film(movie, pictures, len(frames.time), progress)
+    return made
 
 
 @dataclass(frozen=True)
@@ -238,26 +203,222 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
         InputError, ImportError: Something given cannot be used; nothing was simulated.
         RuntimeError: The simulation went wrong.
     """
-    from ..models import Landings, PourAction
+    cups = cups_of(cups)
+    distance_at, rate_at = Argument("distance"), Argument("angular_velocity")
+    distance, rate = number_of(distance, distance_at), number_of(angular_velocity, rate_at)
+    check_distance(distance, cups, distance_at)
+    check_rate(rate, cups, rate_at)
+    liquids = described_liquids(
+        {"viscosity": viscosity, "cohesion": cohesion, "seed": seed},
+        density=number_of(density, Argument("density")),
+        effects=check_effects(effects, "pour"),
+        particles=particles,
+    )
+    movie, out = _checked_files(movie, out, liquids)
+    from xarray import Dataset
 
-    targets = check_targets(movie, out)
-    cups, density = cups_of(cups), number_of(density, Argument("density"))
-    check_distance(number_of(distance, Argument("distance")), cups, Argument("distance"))
-    rate = Argument("angular_velocity")
-    check_rate(number_of(angular_velocity, rate), cups, rate)
-    liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": density}
-    batch = batch_of(liquid, check_effects(effects, "pour"), particles, seed)
-    targets.check_single(batch.single)
-    outcome, particles = LandedParticles(angular_velocity), batch.one.particles
-    simulator = PourSimulator(cups, density, outcome, particles=particles)
+    from ..models import Landings
+
+    one = liquids.flat[0]
+    simulator = PourSimulator(cups, one.density, LandedParticles(rate), particles=one.particles)
     with open_compute(executor, timeout) as compute:
-        signals = simulated(simulator, batch, compute)
+        signals = simulated(simulator, liquids, compute)
     position = signals[:, 1:].reshape(len(signals), -1, 2).astype(np.float32)
-    landings = Landings(position, signals[:, 0])
-    action = PourAction(angular_velocity, distance)
-    found = pour_dataset(batch, landings, action, cups)
-    if targets.out is not None:
-        write_netcdf(found, targets.out)
-    if targets.movie is not None:
-        film_pour(targets.movie, batch.one, simulator, action, progress)
-    return found
+    result = Landings(position, signals[:, 0]).into(distance, cups.receiver.radius)
+    made = Dataset(
+        {
+            **{name: ("simulation", getattr(result, name), {"units": "1"}) for name in FRACTIONS},
+            "landing": (("simulation", "particle", "axis"), position, {"units": "m"}),
+        },
+        coords={"axis": ["ahead", "across"]},
+        attrs={
+            "angular_velocity": rate,
+            "distance": distance,
+            "cups": json.dumps(cups.settings(one.particles)),
+        },
+    )
+    made = _told_apart(made, liquids)
+    if out is not None:
+        write_netcdf(made, out)
+    if movie is not None:
+        from ..movie.pour import pour_pictures
+
+        frames = simulator.frames(theta_of(one) | {RATE: rate}, one.seed, PICTURE_RATE)
+        turn = f"{np.degrees(rate):g}°/s, lip to axis {100 * distance:g} cm"
+        pictures = pour_pictures(frames, cups, distance, [*one.lines(), turn])
+        _film(movie, pictures, len(frames.time), progress)
+    return made
+
+
+def described_liquids(values: Mapping[str, ArrayLike], **shared: Any) -> Liquids:
+    """Liquids of which each value is a number, or an array of one for each simulation.
+
+    Args:
+        values: By the names of `VARIED`.
+        **shared: The other fields of `Described`, the same for all.
+
+    Raises:
+        InputError: A value cannot be used, or arrays differ in length.
+    """
+    columns = {name: _column(name, value) for name, value in values.items()}
+    shapes = {column.shape for column in columns.values()} - {()}
+    if len(shapes) > 1 or any(len(shape) > 1 or 0 in shape for shape in shapes):
+        given = {name: column.shape for name, column in columns.items()}
+        fix = "give numbers, or arrays of one length"
+        raise InputError(f"shapes {given}", where="simulate", fix=fix)
+
+    def one(*of_one: Any) -> Described:
+        return Described(**dict(zip(columns, of_one, strict=True)), **shared)
+
+    return np.vectorize(one, otypes=[object])(*columns.values())
+
+
+def _column(name: str, value: ArrayLike) -> NDArray:
+    """`value` as an array; `Described` looks at each seed.
+
+    Raises:
+        InputError: It is complex, text, or of no one shape.
+    """
+    if name == "seed":
+        return np.asarray(value, dtype=object)
+    try:
+        return checked_array(name, value)
+    except ValueError as err:
+        raise InputError(
+            f"{value!r:.80}", where=Argument(name), fix="give a number, or an array of them"
+        ) from err
+
+
+def _replaced(liquids: Liquids, **changes: Any) -> Liquids:
+    """All of the liquids with other values of these fields."""
+    return np.vectorize(lambda one: replace(one, **changes), otypes=[object])(liquids)
+
+
+def theta_of(described: Described) -> dict[str, float]:
+    """Parameters of a described liquid, and the coefficients of its effects."""
+    liquid = {"viscosity": described.viscosity, "cohesion": described.cohesion}
+    return liquid | dict(described.effects)
+
+
+def simulated(simulator: FluidSimulator, liquids: Liquids, compute: "Compute") -> NDArray:
+    """Signals of all liquids, shape (simulations, ...).
+
+    Args:
+        simulator: Of stirs or pours; the first number of a signal is finite unless it failed.
+        liquids: Their density is the simulator's.
+        compute: Where simulations run.
+
+    Raises:
+        RuntimeError: A simulation failed.
+    """
+    from ..inference.simulations import Job, run_missing
+
+    jobs = [Job(theta_of(one), one.seed) for one in liquids.flat]
+    made, signals = run_missing(simulator.batched, jobs, compute), []
+    for job, one in zip(jobs, made, strict=True):
+        if one.signal is None or not np.isfinite(one.signal.flat[0]):
+            why = one.error or "its result is not finite"
+            raise RuntimeError(f"the simulation of {job.theta} failed: {why}")
+        signals.append(one.signal)
+    return np.stack(signals)
+
+
+def described(made: "Dataset") -> Described:
+    """The liquid that was simulated for a table of one simulation."""
+    read = {name: made.attrs[name] for name in ("viscosity", "cohesion", "particles", "seed")}
+    effects = json.loads(made.attrs["effects"])
+    return Described(**read, density=made.attrs["liquid_density"], effects=effects)
+
+
+def _told_apart(made: "Dataset", liquids: Liquids) -> "Dataset":
+    """A table with its liquids: what differs is over `simulation`, the rest are attributes.
+
+    Where only numbers were given there is no axis of simulations.
+    """
+    attributes = liquids.flat[0].attributes()
+    if liquids.ndim == 0:
+        return made.isel(simulation=0, drop=True).assign_attrs(attributes)
+    varied = {name: [getattr(one, name) for one in liquids] for name in VARIED}
+    shared = {name: value for name, value in attributes.items() if name not in VARIED}
+    return made.assign_attrs(shared).assign_coords(
+        {name: ("simulation", values) for name, values in varied.items()}
+    )
+
+
+def _checked_files(
+    movie: str | Path | None, out: str | Path | None, liquids: Liquids
+) -> tuple[Path | None, Path | None]:
+    """Refuse a movie and a table that could not be written, before anything is simulated.
+
+    Raises:
+        InputError, ImportError: Where and why.
+    """
+    if movie is not None:
+        movie = given_path(movie, Argument("movie"))
+        check_movie(movie)
+        new_file(movie, Argument("movie"))
+    if out is not None:
+        out = new_file(out, Argument("out"), suffix=".nc")
+    if liquids.ndim and (movie or out):
+        raise InputError(
+            "arrays were given, but a file shows one simulation",
+            where=str(movie or out),
+            fix="give numbers, or write what is returned with to_netcdf",
+        )
+    return movie, out
+
+
+def _with_rig(
+    attrs: Mapping[str, float | str], rig: Mapping[str, float] | None
+) -> dict[str, float | str]:
+    """A recording's attributes with those of a rig in their place.
+
+    Raises:
+        InputError: They are no sizes by name, a name is none of `RIG_SIZES`, a value is no positive
+            number, or the stick's mass and density are both given.
+    """
+    sizes = {} if rig is None else rig
+    if not isinstance(sizes, Mapping):
+        raise InputError(f"{rig!r:.80}", where=Argument("rig"), fix="give sizes by name")
+    weights = [name for name in STICK_WEIGHT if name in sizes]
+    for name, value in sizes.items():
+        positive = name in RIG_SIZES and number_of(value, f"rig: {name}") > 0.0
+        if not positive or weights[1:] == [name]:
+            fix = f"give positive {', '.join(LENGTHS)}, and {' or '.join(STICK_WEIGHT)}"
+            raise InputError(f"{value!r}", where=f"rig: {name}", fix=fix)
+    replaced = STICK_WEIGHT if weights else ()
+    return {name: value for name, value in attrs.items() if name not in replaced} | dict(sizes)
+
+
+def _planned(recording: Recording, path: "str | PivotPath | None") -> Recording:
+    """The recording with another path."""
+    from ..hardware.motion import circle, star
+
+    if path is None:
+        return recording
+    patterns = {"star": star, "circle": circle}
+    if isinstance(path, str) and path in patterns:
+        height = float(recording.gripper.position[0, 2])
+        name, timed = path, patterns[path](speed=PATTERN_SPEED, height=height)
+    elif not isinstance(path, str) and hasattr(path, "time") and hasattr(path, "position"):
+        name, timed = "path", path
+    else:
+        raise InputError(
+            f"{path!r:.80}",
+            where=Argument("path"),
+            fix="give star, circle, or what hardware.motion.star returns",
+        )
+    attrs = {key: value for key, value in recording.attrs.items() if key != "speed"}
+    return replace(planned_recording(timed.time, timed.position, attrs), path=Path(name))
+
+
+def _film(path: Path, pictures: Iterable[NDArray], count: int, progress: bool) -> None:
+    """Write a movie of so many pictures."""
+    with progress_bar("drawing", count, shown=progress) as advance:
+
+        def counted() -> Iterator[NDArray]:
+            for picture in pictures:
+                yield picture
+                advance(1)
+
+        write_movie(path, counted())

@@ -30,6 +30,7 @@ from ..types import Simulator
 from .finished_replicates import Replicates
 from .one_replicate import Observe, Pipeline, Replicate, ReplicatePlan, run_replicate
 
+MOST_SHOWN = 40  # letters of a setting in a message
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS settings (name TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS replicate (
@@ -207,7 +208,7 @@ class ReplicateStore:
             execute("COMMIT")
             both = {name: (stored.get(name), settings.get(name)) for name in {*stored, *settings}}
             unlike = [
-                f"{name}: stored {json.dumps(one)}, now {json.dumps(other)}"
+                f"{name}: stored {_start(one)}, now {_start(other)}"
                 for name, (one, other) in sorted(both.items())
                 if stored and one != other
             ]
@@ -255,3 +256,9 @@ def _from_row(row: tuple) -> Replicate:
     size = np.nan if effective is None else effective
     how = {"effective": size, "seconds": seconds, "stage": stage, "error": failure_of(kind, text)}
     return Replicate(number, **how, **held)
+
+
+def _start(value: str | None) -> str:
+    """A setting as a message shows it: representations of pipelines fill pages."""
+    text = json.dumps(value)
+    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."

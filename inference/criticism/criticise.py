@@ -161,7 +161,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         level: p-value below which the base model is rejected.
         plan: How many runs each step may make.
         seed: Fixes everything random.
-        report: Called with the phase and the number of simulations finished in it.
+        report: Called with the phase, the number of simulations finished in it since the last
+            call, and their number in all.
         executor, bank, timeout: See `fit`.
         batch: Simulations in one call of the simulator, where there is no executor.
 
@@ -195,10 +196,10 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     _check_earlier(earlier)
     count = 0
 
-    def counted(phase: str, finished: int) -> None:
+    def counted(phase: str, finished: int, total: int) -> None:
         nonlocal count
         count += finished
-        report(phase, finished)
+        report(phase, finished, total)
 
     with open_compute(executor, timeout, batch, bank) as compute:
         study = Study(experiment, prior, extensions, compute, plan or Plan(), seed, counted)

@@ -1,13 +1,13 @@
 """An experiment, the model that should explain it, and runs of the model that are kept."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 
 from ..arguments import checked_integer
 from ..prior import Prior
+from ..progress import Report
 from ..simulations.bank import Simulation
 from ..simulations.compute import Compute
 from ..simulations.failures import NoSignals, unusable
@@ -20,15 +20,12 @@ from .runs import PriorBox, Runs
 
 MIN_EFFECT_RUNS = 2
 
-Report = Callable[[str, int], object]
-"""(phase, simulations finished in it since the last call)"""
-
 
 class AllRunsFailed(RuntimeError):
     """Every simulation of a phase failed; the message has the first one's error."""
 
 
-def silent(phase: str, finished: int) -> None:
+def silent(phase: str, finished: int, total: int) -> None:
     """Reports nothing."""
 
 
@@ -76,7 +73,8 @@ class Study:
         compute: Where runs are made and kept.
         plan: How many runs each step may make.
         seed: All seeds derive from it.
-        report: Called with the phase and the number of simulations finished in it.
+        report: Called with the phase, the number of simulations finished in it since the last
+            call, and their number in all.
     """
 
     experiment: Experiment
@@ -122,6 +120,8 @@ class Study:
         counts = [len(next(iter(theta.values()))) for theta in thetas]
         seeds = phase_seeds(self.seed, phase, max(counts, default=0))
         asked = [jobs(theta, seeds[:n]) for theta, n in zip(thetas, counts, strict=True)]
+        total = sum(counts)
+        self.report(phase, 0, total)
         try:
             results = run_missing(
                 made_for.simulate,
@@ -129,7 +129,7 @@ class Study:
                 self.compute,
                 made_for.shape,
                 identity=made_for.identity,
-                advance=partial(self.report, phase),
+                advance=lambda finished: self.report(phase, finished, total),
             )
         except NoSignals as error:
             if len(thetas) > 1:  # those of others may return some

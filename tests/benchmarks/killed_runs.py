@@ -30,7 +30,7 @@ import numpy as np
 import xarray as xr
 
 import bolfi_liquids as bl
-from bolfi_liquids.run.result_file import read_result
+from bolfi_liquids.run.results import read_result
 from bolfi_liquids.run.run import SIMULATIONS, Run
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)

@@ -26,7 +26,6 @@ def of_the_demo(**changes):
 
 OTHERS = {
     "another budget": lambda: of_the_demo(budget=8),
-    "another seed": lambda: of_the_demo(seed=3),
     "another recording": lambda: of_the_demo() | {"inputs": {"sha256": ["ab"]}},
     "something else": lambda: {"settings": {"a": 1}, "versions": {"b": "1"}},
 }

@@ -4,29 +4,31 @@ import sys
 
 import pytest
 import rich.console
+from bolfi_liquids.inference import progress
 
-from bolfi_liquids.progress import after_first, phases
+from bolfi_liquids.progress import after_first, phases, progress_bar
 
 
-@pytest.mark.parametrize(
-    ("kept", "steps", "seen"),
-    [(0, [1, 1, 2], [1, 1, 2]), (3, [1, 1, 2, 3], [1, 3]), (9, [4, 4], []), (2, [5], [3])],
-)
-def test_only_steps_after_the_first_ones_move_the_bar(kept, steps, seen):
-    moved = []
-    advance = after_first(kept, moved.append)
-    for one in steps:
-        advance(one)
-    assert moved == seen
+def test_only_steps_after_the_first_ones_move_the_bar():
+    for kept, steps, seen in (
+        (0, [1, 1, 2], [1, 1, 2]),
+        (3, [1, 1, 2, 3], [1, 3]),
+        (9, [4, 4], []),
+        (2, [5], [3]),
+    ):
+        moved = []
+        advance = after_first(kept, moved.append)
+        for one in steps:
+            advance(one)
+        assert moved == seen
 
 
 @pytest.mark.parametrize(
     ("shown", "terminal", "words"),
     [
         (False, True, []),
-        (False, False, []),
-        (True, False, ["search (after 0 simulations)", "checks (after 3 simulations)"]),
-        (True, True, ["checks (4 simulations)", "0:00:00"]),
+        (True, False, ["search: 5 to run", "checks: 2 to run"]),
+        (True, True, ["checks", "1/2", "0:00:00"]),
     ],
 )
 def test_phases_take_over_a_terminal_only_where_they_are_shown(
@@ -37,8 +39,22 @@ def test_phases_take_over_a_terminal_only_where_they_are_shown(
     with phases(shown=shown) as report:
         assert ((sys.stdout, sys.stderr) == streams) is not (shown and terminal)
         print("of the caller")
-        report("search", 3)
-        report("checks", 1)
+        report("search", 0, 5)
+        report("search", 3, 5)
+        report("checks", 0, 2)
+        report("checks", 1, 2)
     told = capsys.readouterr()
     assert "of the caller" in told.out + told.err
     assert all(word in told.err for word in words) and bool(told.err) is bool(words)
+
+
+def test_without_a_terminal_a_long_phase_says_how_far_it_is(capsys, monkeypatch):
+    monkeypatch.setattr(progress, "LINES_APART", 0.0)
+    with progress_bar("stirs", 4, shown=True, done=1, at_least=True) as advance:
+        for _ in range(4):
+            advance(1)
+    told = capsys.readouterr().err.splitlines()
+    assert told == [
+        "stirs: 3 to run at least",
+        *(f"stirs, {n} of {max(n, 4)}" for n in (2, 3, 4, 5)),
+    ]

@@ -13,6 +13,7 @@ from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
 
 from bolfi_liquids import inference
 
+from .least_known import LeastKnown
 from .named import named
 
 KEY, OTHER = jax.random.key(0), jax.random.key(1)

@@ -24,7 +24,7 @@ def draw_least_figures(out):
     from paper.figures import FIGURES, draw_figures
     from paper.study_size import Scale
 
-    from bolfi_liquids.run.workers import processes
+    from bolfi_liquids.run.compute import processes
 
     least = Scale(
         repetitions=1,

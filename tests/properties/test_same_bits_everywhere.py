@@ -9,7 +9,7 @@ import xarray as xr
 from distributed import LocalCluster
 
 import bolfi_liquids as bl
-from bolfi_liquids.cli.compute import ComputeOptions
+from bolfi_liquids.cli.options import ComputeOptions
 from bolfi_liquids.inputs.bundled import bundled_recording
 
 SETTINGS = {"budget": 9, "batch": 3, "particles": 1000, "chains": 2, "draws": 50, "seed": 5}

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from bolfi_liquids.run.workers import processes
+from bolfi_liquids.run.compute import processes
 
 from .figures import FIGURES, draw_figures
 from .study_size import FULL, QUICK

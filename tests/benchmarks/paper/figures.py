@@ -7,9 +7,8 @@ from concurrent.futures import Executor
 from dataclasses import asdict
 from pathlib import Path
 
-from bolfi_liquids.run.lock import alone_in
-from bolfi_liquids.run.provenance import generations, versions
-from bolfi_liquids.run.run import Run
+from bolfi_liquids.run.results import generations, versions
+from bolfi_liquids.run.run import Run, alone_in
 
 from .figure import Drawn
 from .figure_of_geometry import geometry

@@ -14,7 +14,7 @@ from bolfi_liquids.calibration.result import Calibration
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.pouring.landing_map import LandingMap
 from bolfi_liquids.progress import progress_bar
-from bolfi_liquids.run.provenance import generations
+from bolfi_liquids.run.results import generations
 from bolfi_liquids.run.run import SIMULATIONS
 
 from .decisions import map_of_all_liquids

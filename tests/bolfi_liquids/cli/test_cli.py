@@ -5,89 +5,107 @@ import sqlite3
 import subprocess
 import sys
 from importlib.resources import files
+from typing import Annotated
 
 import pytest
+import typer
+from bolfi_liquids.hardware.vision.opencv import opencv
+from typer.main import get_command
 from typer.testing import CliRunner
 
 import bolfi_liquids as bl
 from bolfi_liquids.cli.app import app
+from bolfi_liquids.cli.options import ComputeOptions, grouped
+from bolfi_liquids.inputs.settings import checked, helped
+
+MAIN = "from bolfi_liquids.cli.app import main; main()"
 
 
-def bolfi_liquids(*arguments):
-    """Run the command in a process of its own."""
-    code = "from bolfi_liquids.cli.app import main; main()"
-    return subprocess.run(
-        [sys.executable, "-c", code, *map(str, arguments)], capture_output=True, text=True
-    )
+@pytest.fixture
+def stir(tmp_path, monkeypatch):
+    """A directory to work in, with a recording stir.nc."""
+    monkeypatch.chdir(tmp_path)
+    content = (files("bolfi_liquids.data") / "glycerin_v10.nc").read_bytes()
+    (tmp_path / "stir.nc").write_bytes(content)
+    return tmp_path
 
 
-def test_missing_file_is_one_line_and_debug_shows_where(tmp_path):
+REFUSED = {
+    "calibrate stir.nc": "--out",
+    "calibrate stir.nc --out run --budget ten": "--budget",
+    "calibrate stir.nc --out run --frobnicate": "--frobnicate",
+    "calibrate stir.nc --out run --budget 6": "--budget: 6;",
+    "calibrate stir.nc --out run --surrogate spline": "--surrogate: 'spline';",
+    "calibrate stir.nc --out run --cups cups.toml": "--cups needs --pours",
+    "calibrate stir.nc --out run --workers 2 --dask tcp://127.0.0.1:9": "--workers and --dask",
+    "calibrate stir.nc --out=": "--out: is empty",
+    "criticise run --held-out-pours pours.csv": "--held-out-pours needs --pours",
+    "pour run --iterations 1": "--iterations: 1;",
+    "pour run --arm": "--arm needs --execute",
+    "pour run --execute --emulator --arm": "--arm and --emulator exclude each other",
+    "pour run --execute --budget 64 --cups a.toml": "--budget, --cups: of the choice of a pour",
+    "record --out run --viscosity 0": "--viscosity needs --emulator",
+    "record --out run --target 0.05": "--target needs --calibrate",
+    "record --out run --cycles 0": "--cycles: 0;",
+    "simulate pour --angular-velocity 0": "--angular-velocity: 0 deg/s;",
+    "simulate pour --distance 300": "--distance: 300 cm;",
+    "simulate pour --viscosity 1e999": "--viscosity: inf;",
+    "simulate pour --out a.csv": "a.csv: ends in '.csv'",
+    "simulate stir --effect stick_mass=1_1": "--effect stick_mass=1_1: '1_1'",
+    "simulate stir --out run.nc --seed 2147483648": "--seed: 2147483648;",
+    "simulate stir --movie a.avi": "a.avi: unknown kind of movie",
+    "check sbc --noise-deg -1 --out run": "--noise-deg: -1.0;",
+    "guide poetry": "no page 'poetry'",
+}
+"""What was typed -> how the one line begins that answers."""
+
+
+@pytest.mark.parametrize("typed", REFUSED)
+def test_a_slip_is_named_in_one_line_before_anything_is_written(stir, typed):
+    result = CliRunner().invoke(app, typed.split())
+    assert (result.exit_code, result.stdout) == (2, "")
+    (line,) = result.stderr.strip().splitlines()
+    assert line.startswith("error: ") and REFUSED[typed] in line
+    assert [path.name for path in stir.iterdir()] == ["stir.nc"]
+
+
+@pytest.mark.parametrize("empty", [["--out", " "], ["--out="], [""]])
+def test_a_variable_that_was_not_set_is_no_path(stir, empty):
+    """As a path it would be the current directory."""
+    result = CliRunner().invoke(app, ["calibrate", "stir.nc", *empty])
+    assert result.exit_code == 2
+    (line,) = result.stderr.strip().splitlines()
+    assert ("--out" if "--out" in empty[0] else "argument") in line and "is empty" in line
+
+
+def test_a_missing_file_is_one_line_and_debug_shows_where(tmp_path):
     command = ["calibrate", str(tmp_path / "none.nc"), "--out", str(tmp_path / "run")]
     plain = CliRunner().invoke(app, command)
-    assert plain.exit_code == 2
-    assert plain.stdout == ""
     assert plain.stderr == f"error: {tmp_path}/none.nc: no such file; check the path\n"
-    debug = bolfi_liquids("--debug", *command)
-    assert debug.returncode != 0
-    assert "Traceback" in debug.stderr
-    assert "open_recording" in debug.stderr
-
-
-@pytest.mark.parametrize(
-    ("option", "value"),
-    [
-        ("--budget", "6"),
-        ("--batch", "0"),
-        ("--particles", "9"),
-        ("--seed", "-1"),
-        ("--sampler", "gibbs"),
-        ("--surrogate", "spline"),
-    ],
-)
-def test_bad_option_is_named_with_its_value(short_recording, tmp_path, option, value):
-    out = tmp_path / "run"
-    result = CliRunner().invoke(
-        app, ["calibrate", str(short_recording), "--out", str(out), option, value]
+    debug = subprocess.run(
+        [sys.executable, "-c", MAIN, "--debug", *command], capture_output=True, text=True
     )
-    assert result.exit_code == 2
-    (line,) = result.stderr.strip().splitlines()
-    assert line.startswith(f"error: {option}: ")
-    assert value in line
-    assert not out.exists()
+    assert debug.returncode == 2
+    assert "Traceback" in debug.stderr and "open_recording" in debug.stderr
 
 
-@pytest.mark.parametrize("command", [[], ["calibrate"], ["pour"], ["report"], ["demo"]])
-def test_help_is_no_error(command):
-    result = CliRunner().invoke(app, [*command, "--help"])
-    assert (result.exit_code, result.stderr) == (0, "")
-    assert "Usage" in result.stdout
+def test_a_missing_extra_is_named(stir, monkeypatch):
+    opencv.cache_clear()  # an earlier test of this process may have imported it
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    result = CliRunner().invoke(app, ["rig", "calibrate-cameras", "--print-board", "board.png"])
+    assert result.exit_code == 2 and "pip install 'bolfi-liquids[" in result.stderr
 
 
-@pytest.mark.parametrize("group", [[], ["rig"], ["check"], ["simulate"]])
-def test_a_group_without_a_command_shows_its_help(group):
-    result = CliRunner().invoke(app, group)
-    assert (result.exit_code, result.stderr) == (2, "")
-    assert result.stdout == CliRunner().invoke(app, [*group, "--help"]).stdout
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [(["--budget", "ten"], "--budget"), (["--frobnicate"], "--frobnicate"), ([], "--out")],
-)
-def test_misuse_is_one_line(short_recording, arguments, named):
-    result = CliRunner().invoke(app, ["calibrate", str(short_recording), *arguments])
-    assert result.exit_code == 2
-    (line,) = result.stderr.strip().splitlines()
-    assert line.startswith("error: ") and named in line
+def test_a_group_without_a_command_shows_its_help():
+    for group in ([], ["rig"], ["check"], ["simulate"]):
+        result = CliRunner().invoke(app, group)
+        assert (result.exit_code, result.stderr) == (2, "")
+        assert result.stdout == CliRunner().invoke(app, [*group, "--help"]).stdout
 
 
 @pytest.mark.parametrize(
     ("file", "command", "advice"),
-    [
-        ("posterior.nc", "report", "--resume"),
-        ("posterior.nc", "pour", "--resume"),
-        ("simulations.sqlite", "pour", "another --out"),
-    ],
+    [("posterior.nc", "report", "--resume"), ("simulations.sqlite", "pour", "another --out")],
 )
 def test_damaged_files_are_named(calibration, tmp_path, file, command, advice):
     run = shutil.copytree(calibration.path, tmp_path / "run")
@@ -102,9 +120,7 @@ def test_damaged_files_are_named(calibration, tmp_path, file, command, advice):
 def test_a_bank_damaged_within_is_named(calibration, tmp_path):
     run = shutil.copytree(calibration.path, tmp_path / "run")
     connection = sqlite3.connect(run / "simulations.sqlite")
-    connection.execute("DROP TABLE simulation")
-    connection.execute("CREATE TABLE simulation (x)")
-    connection.commit()
+    connection.executescript("DROP TABLE simulation; CREATE TABLE simulation (x)")
     connection.close()
     result = CliRunner().invoke(app, ["pour", str(run)])
     assert result.exit_code == 2
@@ -112,124 +128,18 @@ def test_a_bank_damaged_within_is_named(calibration, tmp_path):
     assert "simulations.sqlite" in line
 
 
-def test_cups_in_millimetres_are_refused(calibration, tmp_path):
-    good = (files("bolfi_liquids.data") / "cups.toml").read_text(encoding="utf-8")
-    path = tmp_path / "cups.toml"
-    path.write_text(good.replace("radius = 0.028", "radius = 28.0"), encoding="utf-8")
-    result = CliRunner().invoke(app, ["pour", str(calibration.path), "--cups", str(path)])
-    assert result.exit_code == 2
-    assert "source.radius: 28 m looks like millimetres" in result.stderr
-
-
-@pytest.mark.parametrize("command", ["pour", "report"])
-def test_directory_without_a_run_is_refused(tmp_path, command):
-    result = CliRunner().invoke(app, [command, str(tmp_path)])
-    assert result.exit_code == 2
-    (line,) = result.stderr.strip().splitlines()
-    assert line.startswith(f"error: {tmp_path}: no run.toml")
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "named"),
-    [
-        ("radius = 0.028", "radius = -0.028", "-0.028"),
-        ("lip_height", "lip_hight", "lip_height"),
-        ("[source]", "[source", "not TOML"),
-    ],
-)
-def test_bad_cups_are_refused_in_one_line(calibration, tmp_path, old, new, named):
-    good = (files("bolfi_liquids.data") / "cups.toml").read_text(encoding="utf-8")
-    assert old in good
-    path = tmp_path / "cups.toml"
-    path.write_text(good.replace(old, new), encoding="utf-8")
-    result = CliRunner().invoke(app, ["pour", str(calibration.path), "--cups", str(path)])
-    assert result.exit_code == 2
-    (line,) = result.stderr.strip().splitlines()
-    assert line.startswith(f"error: {path}: ")
-    assert named in line
-
-
-def test_resuming_where_no_run_is_is_refused(short_recording, tmp_path):
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "run.toml").touch()
-    mistyped = tmp_path / "mien"
-    command = ["calibrate", str(short_recording), "--out", str(mistyped), "--resume"]
-    result = CliRunner().invoke(app, command)
-    assert result.exit_code == 2
-    (line,) = result.stderr.strip().splitlines()
-    assert line.startswith(f"error: {mistyped}: holds no run to resume")
-    assert str(tmp_path / "mine") in line
-    assert not mistyped.exists()
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        ["calibrate", "stir.nc", "--out", ""],
-        ["calibrate", "stir.nc", "--out="],
-        ["record", "--emulator", "--out", ""],
-        ["record", "--emulator", "--calibrate", ""],
-        ["simulate", "stir", "--out", ""],
-        ["simulate", "pour", "--movie="],
-        ["check", "sbc", "--out", ""],
-        ["demo", "--out", ""],
-        ["import", "stir.csv", "--columns", "columns.toml", "--out", ""],
-        ["import", "--template", ""],
-        ["rig", "template", ""],
-        ["rig", "calibrate-cameras", "--print-board", ""],
-        ["criticise", ""],
-        ["pour", ""],
-        ["report", ""],
-    ],
-)
-def test_a_variable_that_was_not_set_is_no_path(monkeypatch, tmp_path, command):
-    """As a path it would be the current directory."""
-    monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(app, command)
-    assert result.exit_code == 2
-    (line,) = result.stderr.strip().splitlines()
-    *before, last = command
-    option = last.rstrip("=") or before[-1]
-    named = option if option.startswith("--") else "argument"
-    assert "is empty" in line and named in line
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        ["calibrate", "{recording}", "--out", "run"],
-        ["check", "sbc", "--out", "run"],
-        ["simulate", "stir", "--out", "stir.nc"],
-        ["simulate", "pour", "--out", "pour.nc"],
-    ],
-)
-@pytest.mark.parametrize("seed", ["-1", str(2**31)])
-def test_a_seed_out_of_range_is_refused_before_anything_is_written(
-    monkeypatch, short_recording, tmp_path, command, seed
-):
-    monkeypatch.chdir(tmp_path)
-    command = [part.format(recording=short_recording) for part in command]
-    result = CliRunner().invoke(app, [*command, "--seed", seed])
-    assert result.exit_code == 2
-    (line,) = result.stderr.strip().splitlines()
-    assert "seed" in line and seed in line
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_interruption_says_how_to_go_on(monkeypatch, tmp_path):
+def test_interruption_says_how_to_go_on(monkeypatch, stir):
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    recording = tmp_path / "stir me.nc"
-    recording.write_bytes((files("bolfi_liquids.data") / "glycerin_v10.nc").read_bytes())
-    (tmp_path / "run.toml").touch()  # as soon as it is there, a run has begun
-    command = ["calibrate", str(recording), "--out", str(tmp_path)]
+    recording = (stir / "stir.nc").rename(stir / "stir me.nc")
+    (stir / "run.toml").touch()  # as soon as it is there, a run has begun
+    command = ["calibrate", str(recording), "--out", str(stir)]
     monkeypatch.setattr("bolfi_liquids.calibration.calibrate.calibrate", interrupt)
     monkeypatch.setattr(sys, "argv", ["bolfi-liquids", *command])
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 130
-    assert f"bolfi-liquids calibrate '{recording}' --out {tmp_path} --resume" in result.stderr
+    assert f"bolfi-liquids calibrate '{recording}' --out {stir} --resume" in result.stderr
 
 
 STOPPED = """
@@ -247,33 +157,18 @@ main()
 
 
 def test_a_command_that_is_terminated_says_how_to_go_on(short_recording, tmp_path):
-    (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "run.toml").touch()
-    command = ["calibrate", str(short_recording), "--out", str(tmp_path / "run")]
+    (tmp_path / "run.toml").touch()
+    command = ["calibrate", str(short_recording), "--out", str(tmp_path)]
     done = subprocess.run([sys.executable, "-c", STOPPED, *command], capture_output=True, text=True)
     assert done.returncode == 130
-    assert f"--out {tmp_path / 'run'} --resume" in done.stderr and "Traceback" not in done.stderr
+    assert f"--out {tmp_path} --resume" in done.stderr and "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["guide"], ["guide", "files"]])
-def test_a_reader_that_has_read_enough_is_no_error(arguments):
-    code = "from bolfi_liquids.cli.app import main; main()"
-    command = [sys.executable, "-c", code, *arguments]
+def test_a_reader_that_has_read_enough_is_no_error():
+    command = [sys.executable, "-c", MAIN, "guide", "files"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         process.stdout.close()  # as `head` does
         assert process.stderr.read() == b""
-
-
-def test_version():
-    result = CliRunner().invoke(app, ["--version"])
-    assert result.stdout == f"bolfi-liquids {bl.__version__}\n"
-
-
-def test_import_is_cheap():
-    heavy = ("jax", "taichi", "xarray", "matplotlib", "numpyro")
-    code = f"import sys, bolfi_liquids; print([m for m in {heavy} if m in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"
 
 
 def test_public_names_are_what_they_say():
@@ -283,3 +178,60 @@ def test_public_names_are_what_they_say():
     assert callable(bl.calibrate)  # also after a module of the package was imported
     with pytest.raises(AttributeError, match="stirr"):
         getattr(bl, "stirr")  # noqa: B009  pyright would know that it is not there
+    assert CliRunner().invoke(app, ["--version"]).stdout == f"bolfi-liquids {bl.__version__}\n"
+
+
+# options
+
+
+def commands(command=None, words=()):
+    """Words of each command, and the command."""
+    command = get_command(app) if command is None else command
+    for name, child in command.commands.items():
+        if getattr(child, "commands", None):
+            yield from commands(child, (*words, name))
+        else:
+            yield " ".join((*words, name)), child
+
+
+def test_every_command_that_simulates_says_where_and_for_how_long():
+    elsewhere = {"import", "guide", "record", "trim"}  # nothing, or in real time beside an arm
+    simulating = {
+        words: {name for parameter in command.params for name in parameter.opts}
+        for words, command in commands()
+        if words not in elsewhere and not words.startswith("rig ")
+    }
+    assert simulating.keys() >= {"calibrate", "report", "check sbc", "simulate stir"}
+    lacking = {
+        words
+        for words, options in simulating.items()
+        if not options >= {"--workers", "--dask", "--timeout"}
+    }
+    assert not lacking
+
+
+def test_one_worker_is_this_process():
+    with ComputeOptions().opened() as compute:
+        assert compute.executor is None
+
+
+@checked()
+class Size:
+    width: Annotated[int, helped("In cm.")] = 3
+    height: Annotated[int | None, helped("In cm.")] = None
+
+
+def test_settings_become_options_and_arrive_whole():
+    app, seen = typer.Typer(), []
+
+    @app.command()
+    @grouped
+    def draw(
+        name: Annotated[str, typer.Argument()], size: Size, loud: Annotated[bool, typer.Option()]
+    ) -> None:
+        seen.append((name, size, loud))
+
+    assert CliRunner().invoke(app, ["box", "--height", "7", "--loud"]).exit_code == 0
+    assert CliRunner().invoke(app, ["box", "--no-loud", "--width", "1"]).exit_code == 0
+    assert CliRunner().invoke(app, ["box", "--loud", "--depth", "7"]).exit_code == 2
+    assert seen == [("box", Size(3, 7), True), ("box", Size(1, None), False)]

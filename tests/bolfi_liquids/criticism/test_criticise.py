@@ -14,7 +14,7 @@ from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.open import open_recordings
 from bolfi_liquids.inputs.settings import CriticismSettings
-from bolfi_liquids.run.recordings import kept_recordings
+from bolfi_liquids.run.run import Run
 
 HEADER = "angular_velocity_deg_s,distance_cm,spilled,received,retained"
 ROWS = ["45,1,5,90,5", "90,2,10,85,5", "60,3,20,75,5"]
@@ -152,4 +152,4 @@ def test_a_run_keeps_its_recordings_and_refuses_a_changed_copy(calibration, tmp_
     (tmp_path / "recordings" / kept.path.name).write_bytes(kept.path.read_bytes())
     record = {**calibration.record, "inputs": {"sha256": ["another"]}}
     with pytest.raises(InputError, match=kept.path.name):
-        kept_recordings(tmp_path, record)
+        _ = Run(tmp_path, record).recordings

@@ -175,14 +175,13 @@ def test_attributes_of_a_recording_are_told(dataset):
         assert f"@{name}" in listed or name == "stick_density"
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_pages_are_installed_and_printed(page):
-    assert (files("bolfi_liquids.guide") / f"{page}.md").is_file()
-    result = CliRunner().invoke(app, ["guide", page], env={"COLUMNS": "80"})
-    assert result.exit_code == 0
-    title = read_page(page).splitlines()[0].removeprefix("# ")
-    assert title in result.stdout
-    assert max(map(len, result.stdout.splitlines())) <= 80
+def test_pages_are_installed_and_printed():
+    for page in PAGES:
+        assert (files("bolfi_liquids.guide") / f"{page}.md").is_file()
+        result = CliRunner().invoke(app, ["guide", page], env={"COLUMNS": "80"})
+        assert result.exit_code == 0
+        assert read_page(page).splitlines()[0].removeprefix("# ") in result.stdout
+        assert max(map(len, result.stdout.splitlines())) <= 80, page
 
 
 def test_without_a_name_the_pages_are_listed():
@@ -191,13 +190,6 @@ def test_without_a_name_the_pages_are_listed():
     *lines, last = result.stdout.splitlines()
     assert [line.split()[0] for line in lines] == list(PAGES)
     assert "bolfi-liquids guide PAGE" in last
-
-
-def test_an_unknown_page_is_named():
-    result = CliRunner().invoke(app, ["guide", "poetry"])
-    assert result.exit_code == 2
-    (line,) = result.stderr.splitlines()
-    assert "'poetry'" in line and all(page in line for page in PAGES)
 
 
 def commands():
@@ -235,10 +227,10 @@ def test_every_option_in_the_pages_exists():
         assert option in known, option
 
 
-@pytest.mark.parametrize("words", [words for words in commands() if words], ids=" ".join)
-def test_every_command_shows_how_it_is_typed(words):
-    result = CliRunner().invoke(app, [*words, "--help"], env={"COLUMNS": "80"})
-    assert result.exit_code == 0
-    if words not in {("check",), ("rig",), ("simulate",)}:  # groups list their commands
+def test_every_command_shows_how_it_is_typed():
+    groups = {("check",), ("rig",), ("simulate",), ()}  # list their commands
+    for words in commands():
+        result = CliRunner().invoke(app, [*words, "--help"], env={"COLUMNS": "80"})
+        assert result.exit_code == 0
         shown = result.stdout.rpartition("For example:")[2]
-        assert f"bolfi-liquids {' '.join(words)}" in shown
+        assert words in groups or f"bolfi-liquids {' '.join(words)}" in shown, words

@@ -8,22 +8,21 @@ from typer.testing import CliRunner
 
 from bolfi_liquids import models
 from bolfi_liquids.cli.app import app
-from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.cups import bundled_cups
-from bolfi_liquids.inputs.described_liquid import Described, read_effects
 from bolfi_liquids.inputs.open import open_recording
-from bolfi_liquids.movie.file import KINDS, write_movie
-from bolfi_liquids.movie.landed_liquid import GRAVITY, landed, level
+from bolfi_liquids.movie.file import write_movie
 from bolfi_liquids.movie.pour import (
+    GRAVITY,
+    landed,
+    level,
     pour_pictures,
     pour_view,
     receiver_glass,
     source_glass,
 )
+from bolfi_liquids.movie.rendering import Glass, OrthographicView, surface
 from bolfi_liquids.movie.stir import stir_pictures, stir_view
-from bolfi_liquids.movie.surface import Glass, surface
-from bolfi_liquids.movie.view import OrthographicView
 
 UP = np.array([0.0, 0.0, 1.0])
 FAR = Glass(0.01, 0.01, np.array([9.0, 9.0, 9.0]), UP)  # holds nothing of what is drawn
@@ -72,7 +71,6 @@ def test_points_are_where_an_orthographic_camera_sees_them():
     tilted = OrthographicView(201, 101, 500.0, (0.1, 0.2, 0.3), 0.0, np.radians(30.0))
     up = 0.04 * np.cos(np.radians(30.0)) + 0.03 * np.sin(np.radians(30.0))
     assert tilted.pixels(point) == pytest.approx([110.0, 50.0 - 500.0 * up])
-    assert tilted.world(tilted.camera(point)) == pytest.approx(point)
     assert tilted.axes @ tilted.axes.T == pytest.approx(np.eye(3))
     assert tilted.camera(point - [0.0, 0.1, 0.0])[2] > tilted.camera(point)[2]
 
@@ -228,9 +226,13 @@ def test_animations_have_their_frames_size_and_rate(tmp_path, suffix):
         image.seek(3)
         shown = np.asarray(image.convert("RGB")).astype(int)
         assert image.info["duration"] == 40
-    square = np.flatnonzero(shown[20, :, 2] - shown[20, :, 0] > 80)
-    assert [square.min(), square.max()] == pytest.approx([9, 23], abs=1)
-    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    assert edges(shown) == pytest.approx([9, 23], abs=1)
+
+
+def edges(picture):
+    """First and last column of the blue square."""
+    square = np.flatnonzero(picture[20, :, 2] - picture[20, :, 0] > 80)
+    return [square.min(), square.max()]
 
 
 def test_an_mp4_has_its_frames_size_and_rate(tmp_path):
@@ -241,11 +243,10 @@ def test_an_mp4_has_its_frames_size_and_rate(tmp_path):
         assert (stream.width, stream.height, stream.average_rate) == (64, 48, 25)
         shown = [frame.to_ndarray(format="rgb24").astype(int) for frame in file.decode(stream)]
     assert len(shown) == 7
-    square = np.flatnonzero(shown[3][20, :, 2] - shown[3][20, :, 0] > 80)
-    assert [square.min(), square.max()] == pytest.approx([9, 23], abs=2)
+    assert edges(shown[3]) == pytest.approx([9, 23], abs=2)
 
 
-@pytest.mark.parametrize("suffix", KINDS)
+@pytest.mark.parametrize("suffix", [".mp4", ".webp"])
 def test_a_film_that_breaks_leaves_the_old_one(tmp_path, suffix):
     def broken():
         yield from moving_square(2)
@@ -255,80 +256,6 @@ def test_a_film_that_breaks_leaves_the_old_one(tmp_path, suffix):
     with pytest.raises(KeyboardInterrupt):
         write_movie(tmp_path / f"a{suffix}", broken())
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [(f"a{suffix}", "old")]
-
-
-@pytest.mark.parametrize(
-    ("text", "scene", "message"),
-    [
-        ("warmth=1", "stir", "--effect warmth=1: unknown; there are .*warming"),
-        ("warming", "stir", "'' is no coefficient.*warming=NUMBER"),
-        ("adhesion=nan", "pour", "'nan' is no coefficient"),
-        ("adhesion=-3", "pour", "no coefficient.*from -2 to 2"),
-        ("camera_tilt=0.1", "pour", "does not act in a pour"),
-        ("adhesion=0.3", "stir", "does not act in a stir"),
-    ],
-)
-def test_bad_effects_are_named(text, scene, message):
-    with pytest.raises(InputError, match=message):
-        read_effects([text], scene)
-
-
-def test_effects_are_read():
-    read = read_effects(["warming=0.01", "adhesion = 0.3"], "pour")
-    assert read == {"warming": 0.01, "adhesion": 0.3}
-    with pytest.raises(InputError, match="given twice"):
-        read_effects(["adhesion=0.3", "adhesion=0.3"], "pour")
-
-
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [("viscosity", -1.0), ("cohesion", np.nan), ("density", 0.0), ("particles", 3), ("seed", -1)],
-)
-def test_bad_liquids_are_named(field, value):
-    fine = {"viscosity": 1.0, "cohesion": 0.2, "density": 1000.0, "particles": 300, "seed": 0}
-    Described(**fine)
-    with pytest.raises(InputError, match=f"^{field}"):
-        Described(**{**fine, field: value})
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["stir", "--movie", "a.avi"], "unknown kind of movie '.avi'"),
-        (["stir", "--movie", "none/a.gif"], "none: no such directory"),
-        (["pour", "--movie", "here.gif"], "here.gif: is a directory"),
-        (["pour", "--out", "a.csv"], "ends in '.csv'"),
-        (["pour", "--distance", "300"], "--distance: 300 cm; the cups stand 0 to 7 cm"),
-        (["pour", "--angular-velocity", "-5"], "-5 deg/s; the cups are turned at 30 to 180"),
-        (["pour", "--distance", "50"], "--distance: 50 cm; the cups stand 0 to 7 cm"),
-        (["pour", "--angular-velocity", "1.5"], "1.5 deg/s; the cups are turned at 30 to 180"),
-        (["stir", "--viscosity", "-5"], "--viscosity: -5.0"),
-        (["pour", "--viscosity", "1e300"], "--viscosity: 1e+300"),
-        (["pour", "--viscosity", "1e999"], "--viscosity: inf"),
-        (["pour", "--distance", "nan"], "--distance: nan"),
-        (["pour", "--density", "1e9"], "--density: 1000000000.0"),
-        (["stir", "--effect", "stick_mass=1_1"], "--effect stick_mass=1_1: '1_1'"),
-        (["stir", "--recording", "none.nc"], "none.nc: no such file"),
-    ],
-)
-def test_what_cannot_be_done_is_told_before_anything_is_simulated(
-    tmp_path, monkeypatch, arguments, message
-):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "here.gif").mkdir()
-    monkeypatch.setattr(models.runtime, "start", lambda: pytest.fail("Taichi was started"))
-    result = CliRunner().invoke(app, ["simulate", *arguments])
-    assert result.exit_code == 2
-    assert message in " ".join(result.stderr.split())
-
-
-@pytest.mark.parametrize(
-    ("scene", "units"), [("stir", ["Pa s"]), ("pour", ["Pa s", "deg/s", "cm"])]
-)
-def test_help_tells_the_units_and_an_example(scene, units):
-    said = CliRunner().invoke(app, ["simulate", scene, "--help"]).stdout
-    assert all(f"in {unit}" in said for unit in units)
-    assert f"bolfi-liquids simulate {scene} --viscosity" in said
 
 
 @pytest.mark.slow

@@ -22,7 +22,7 @@ from bolfi_liquids.online.estimate import Problem
 from bolfi_liquids.online.online import OnlineCalibration, OnlineChoice, OnlinePhase
 from bolfi_liquids.online.plan import PartialRecording
 from bolfi_liquids.online.settings import OnlineSettings
-from bolfi_liquids.run.lock import alone_in
+from bolfi_liquids.run.run import alone_in
 from bolfi_liquids.simulators import stir_simulator
 
 # the process that simulates gives way to others: beside another test it gets little

@@ -74,11 +74,11 @@ def test_what_outcomes_explain_is_no_residual():
     slope = np.linspace(0.1, 0.5, 9)
     wide = 0.5 + np.linspace(-2.0, 2.0, 64)[:, None] * slope
     seen = 0.5 + slope
-    explained, not_explained = (
+    explained, notexplained = (
         learn_residual(at, seen, here, 0.08, (1.0, 1.0)).sd
         for here in (wide, np.full((64, 9), 0.5))
     )
-    assert explained < 0.5 * not_explained
+    assert explained < 0.5 * notexplained
 
 
 def test_a_share_and_its_angle(rng):

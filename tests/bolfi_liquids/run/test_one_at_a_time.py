@@ -14,8 +14,7 @@ from typer.testing import CliRunner
 import bolfi_liquids as bl
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.run.lock import LOCK, alone_in
-from bolfi_liquids.run.run import RUN_TOML, Run
+from bolfi_liquids.run.run import LOCK, RUN_TOML, Run, alone_in
 
 RECORD = {
     "settings": {"budget": 20, "seed": 0},
@@ -65,11 +64,12 @@ def test_what_writes_into_a_run_keeps_out_while_another_command_works_there(tmp_
     assert contents(run).keys() == {RUN_TOML, LOCK}
 
 
-@pytest.mark.parametrize("command", [one for one in commands_in(Path()) if one != "calibrate"])
-def test_a_mistyped_run_is_not_made(tmp_path, command):
-    call, _ = commands_in(tmp_path / "runs" / "mien")[command]
-    with pytest.raises(InputError, match="mien"):
-        call()
+def test_a_mistyped_run_is_not_made(tmp_path):
+    calls = commands_in(tmp_path / "runs" / "mien")
+    del calls["calibrate"]
+    for call, _ in calls.values():
+        with pytest.raises(InputError, match="mien"):
+            call()
     assert list(tmp_path.iterdir()) == []
 
 

@@ -60,6 +60,7 @@ def test_diverged_ones_are_left_out():
         compute = Compute(bank=bank, batch=8)
         kept = simulate_kept(Made(simulate), {"a": np.array([0.0, 2.0, 1.0])}, [1, 2, 3], compute)
         np.testing.assert_array_equal(kept.signals, [[0.0], [1.0]])
+        assert kept.places.tolist() == [0, 2]
         with pytest.raises(RuntimeError, match="all 1 simulations failed"):
             simulate_kept(Made(simulate), {"a": np.array([2.0])}, [2], compute)
 
@@ -87,32 +88,22 @@ def test_where_all_fail_the_advice_is_of_their_kind(a, failure):
     assert [kind for kind, cure in CURES.items() if cure in str(failed.value)] == [failure]
 
 
-def test_simulations_that_took_too_long_are_counted(caplog):
-    def slow(theta, seeds):
-        time.sleep(30.0 if theta["a"][0] > 1.0 else 0.0)
-        return theta["a"][:, None]
-
-    with SimulationBank() as bank:
-        compute = Compute(bank=bank, batch=1, executor=None, timeout=0.2)
-        simulate_kept(Made(slow), {"a": np.array([0.0, 2.0, 3.0])}, [1, 2, 3], compute)
-        simulate_kept(Made(slow), {"a": np.array([0.0])}, [1], compute)
-    (notice,) = caplog.records
-    assert notice.args == (2, 3, 0.2)
-
-
 def test_simulations_that_failed_are_counted_with_the_first_reason(caplog):
     """A bar counts them as done."""
 
     def simulate(theta, seeds):
+        if theta["a"][0] > 3.0:
+            time.sleep(30.0)
         if theta["a"][0] > 2.0:
             raise OSError("the disk\nis full")
         return np.where(theta["a"] > 1.0, np.nan, theta["a"])[:, None]
 
+    theta = {"a": np.array([0.0, 2.0, 3.0, 1.0, 4.0])}
     with SimulationBank() as bank:
         for repeated in range(2):  # what the bank holds is told again
             caplog.clear()
-            theta = {"a": np.array([0.0, 2.0, 3.0, 1.0])}
-            simulate_kept(Made(simulate), theta, [1, 2, 3, 4], Compute(bank=bank, batch=1))
-            (notice,) = caplog.records
-            assert notice.args[:2] == (2, 4), repeated
-            assert "\n" not in notice.getMessage()
+            compute = Compute(bank=bank, batch=1, timeout=0.2)
+            simulate_kept(Made(simulate), theta, [1, 2, 3, 4, 5], compute)
+            overdue, failed = caplog.records
+            assert overdue.args == (1, 5, 0.2), repeated
+            assert failed.args[:2] == (2, 5) and "\n" not in failed.getMessage()

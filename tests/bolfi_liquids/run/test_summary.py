@@ -7,19 +7,14 @@ import numpy as np
 
 from bolfi_liquids.calibration.summary import CalibrationSummary
 from bolfi_liquids.criticism.summary import CriticismSummary
-from bolfi_liquids.pouring.result import PourSummary
-from bolfi_liquids.run.summary import write_summary
+from bolfi_liquids.run.results import write_summary
 
 
-def test_sections_survive_writing_and_reading(calibration, criticism_summary):
-    for summary in (calibration.summary, criticism_summary):
+def test_sections_survive_writing_and_reading(calibration, criticism_summary, pour):
+    for summary in (calibration.summary, criticism_summary, pour.summary):
         assert type(summary).from_json(json.loads(json.dumps(summary.to_json()))) == summary
     stroke, speed = criticism_summary.to_json()["where"]
     assert "speed" not in stroke and speed["speed"] and speed["stroke"] is None
-
-
-def test_the_section_of_a_pour_survives_too(pour):
-    assert PourSummary.from_json(json.loads(json.dumps(pour.summary.to_json()))) == pour.summary
 
 
 def test_what_json_cannot_hold_is_null_and_comes_back(calibration):
