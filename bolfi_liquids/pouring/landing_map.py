@@ -18,13 +18,12 @@ from ..inputs.pour_table import PourTable
 from ..inputs.settings import MIN_MAP_POURS
 from ..seeds import Phase, generator
 from ..simulators import RATE
-from .design import Box
 from .given import GivenPours, learn_given
-from .landed_pours import Poured
 from .parcels import fractions_of, scale
-from .result import Judged
+from .pours import Box, Poured
 from .spillage import (
     MAX_LANDING_SDS,
+    Judged,
     Profiles,
     Surface,
     landed,
@@ -169,7 +168,7 @@ class LandingMap:
         spilled = self._spilled(table, outcomes, misses)
         landed = self._landed(table.angular_velocity, table.distance, outcomes, misses)
         retained = landed[:, ::LANDINGS_PER_DRAW, 2].T  # the same wherever the liquid lands
-        return replace(self, given=learn_given(table, spilled, retained))
+        return replace(self, given=learn_given(table, (spilled, retained)))
 
     def _outcomes(
         self, liquids: Mapping[str, NDArray], seed: int

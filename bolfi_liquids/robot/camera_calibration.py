@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
@@ -12,21 +12,9 @@ from ..inputs.rigs import rig_of
 
 if TYPE_CHECKING:
     from ..hardware import Camera
-    from ..hardware.vision import CameraModel, CharucoBoard, Intrinsics
+    from ..hardware.vision import CameraModel, Intrinsics
 
 BOARD_PICTURES = 15
-
-
-class Pictures(NamedTuple):
-    """Pictures from which a camera is calibrated, grey levels.
-
-    Attributes:
-        boards: Of the board; empty to keep the lens.
-        plumb_line: Of a thread that hangs; None to keep the roll.
-    """
-
-    boards: list[np.ndarray]
-    plumb_line: np.ndarray | None
 
 
 def write_board(path: Path) -> Path:
@@ -70,8 +58,14 @@ def calibrate_view(
         RigError: The rig, the camera or the pictures cannot be used.
     """
     from ..hardware import RigError
+    from ..hardware.recorder.views import camera_model, orientation
     from ..hardware.rig import View
-    from ..hardware.vision import CalibrationError, CharucoBoard, PlumbLineError
+    from ..hardware.vision import (
+        CalibrationError,
+        CharucoBoard,
+        PlumbLineError,
+        calibrate_intrinsics,
+    )
 
     if view not in get_args(View):
         raise InputError(f"{view!r}", where=Argument("view"), fix="give xz or yz")
@@ -84,38 +78,30 @@ def calibrate_view(
     camera = rig_of(rig).camera(view)  # type: ignore[arg-type]
     usual = CharucoBoard()
     board = CharucoBoard(square=square, marker=square * usual.marker / usual.square)
-    pictures = _pictures(camera, boards, plumb_line)
+    if boards is None and plumb_line is None:
+        on_board, thread = _taken(camera)
+    else:
+        on_board = [] if boards is None else _read(boards)
+        thread = None if plumb_line is None else _read(plumb_line)[0]
     try:
-        lens, model = _lens(camera, pictures, board)
-        if lens is not None:
-            beside = Path(rig).parent if rig is not None else Path()
+        if on_board:
+            lens = calibrate_intrinsics(on_board, board)
+            beside = Path() if rig is None else Path(rig).parent
             yield from _written(lens, beside / f"camera_{view}.json" if out is None else out)
-        yield _roll(camera, model, pictures.plumb_line)
+            model = lens.placed(orientation(camera), np.array(camera.position))
+        else:
+            model = camera_model(camera)
+        yield _roll(camera, model, thread)
     except (CalibrationError, PlumbLineError) as err:
         raise RigError(str(err), where=f"camera {view}", fix="take the pictures again") from err
 
 
-def _pictures(camera: "Camera", boards: Path | None, plumb_line: Path | None) -> Pictures:
-    """From files, or taken by the camera.
+def _read(path: Path) -> list[np.ndarray]:
+    """All pictures of a directory, of a video, or the one of a file; grey levels.
 
     Raises:
-        RigError: The camera or a file cannot be used.
+        RigError: It cannot be used.
     """
-    from ..hardware import RigError
-    from ..hardware.cameras import CameraError
-
-    if boards is None and plumb_line is None:
-        try:
-            return _taken(camera)
-        except CameraError as err:
-            where = f"camera {camera.view}: source = {camera.source!r}"
-            raise RigError(str(err), where=where, fix="correct rig.toml") from err
-    on_board = [] if boards is None else _read(boards)
-    return Pictures(on_board, None if plumb_line is None else _read(plumb_line)[0])
-
-
-def _read(path: Path) -> list[np.ndarray]:
-    """All pictures of a directory, of a video, or the one of a file."""
     from ..hardware import RigError
     from ..hardware.cameras import CameraError, FilesCamera
 
@@ -125,38 +111,34 @@ def _read(path: Path) -> list[np.ndarray]:
         raise RigError(str(err), where=str(path), fix="give a directory of pictures") from err
 
 
-def _taken(camera: "Camera") -> Pictures:
-    """Pictures of the board and of the plumb line, each once a person is ready."""
+def _taken(camera: "Camera") -> tuple[list[np.ndarray], np.ndarray]:
+    """Pictures of the board and of the plumb line, grey levels, each once a person is ready.
+
+    Raises:
+        RigError: The camera cannot be used.
+    """
+    from ..hardware import RigError
     from ..hardware.cameras import CameraError
     from ..hardware.session.cameras import open_camera
 
-    with closing(open_camera(camera)) as source:
+    how = "hold it still, tilted, then press Enter "
+    hang = "plumb line: hang a thread in front of an even background, then press Enter "
+    numbers = range(1, BOARD_PICTURES + 1)
+    asked = [f"board, picture {n} of {BOARD_PICTURES}: {how}" for n in numbers]
+    try:
+        with closing(open_camera(camera)) as source:
 
-        def after(question: str) -> np.ndarray:
-            input(question)
-            source.read()  # what the driver has kept from before
-            if (frame := source.read()) is None:
-                raise CameraError("the camera gives no more pictures")
-            return frame.image
+            def after(question: str) -> np.ndarray:
+                input(question)
+                source.read()  # what the driver has kept from before
+                if (frame := source.read()) is None:
+                    raise CameraError("the camera gives no more pictures")
+                return frame.image
 
-        how = "hold it still, tilted, then press Enter "
-        numbers = range(1, BOARD_PICTURES + 1)
-        on_board = [after(f"board, picture {n} of {BOARD_PICTURES}: {how}") for n in numbers]
-        hang = "plumb line: hang a thread in front of an even background, then press Enter "
-        return Pictures(on_board, after(hang))
-
-
-def _lens(
-    camera: "Camera", pictures: Pictures, board: "CharucoBoard"
-) -> "tuple[Intrinsics | None, CameraModel]":
-    """The lens that the board shows, if it does, and the camera with it at the rig's place."""
-    from ..hardware.recorder.views import camera_model, orientation
-    from ..hardware.vision import calibrate_intrinsics
-
-    if not pictures.boards:
-        return None, camera_model(camera)
-    lens = calibrate_intrinsics(pictures.boards, board)
-    return lens, lens.placed(orientation(camera), np.array(camera.position))
+            return [after(question) for question in asked], after(hang)
+    except CameraError as err:
+        where = f"camera {camera.view}: source = {camera.source!r}"
+        raise RigError(str(err), where=where, fix="correct rig.toml") from err
 
 
 def _written(lens: "Intrinsics", path: Path) -> Iterator[str]:

@@ -24,9 +24,9 @@ from scipy.ndimage import gaussian_filter1d
 
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.pouring.design import box_around, joint_prior
-from bolfi_liquids.pouring.landed_pours import Parcels, Poured, pours_in
 from bolfi_liquids.pouring.landing_map import learn_map
+from bolfi_liquids.pouring.parcels import Parcels
+from bolfi_liquids.pouring.pours import Poured, box_around, joint_prior, pours_in
 from bolfi_liquids.pouring.spillage import Surface, surface
 from bolfi_liquids.progress import silent
 from bolfi_liquids.simulators import RATE, PourSimulator

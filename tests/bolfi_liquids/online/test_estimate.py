@@ -31,7 +31,7 @@ from bolfi_liquids.online.plan import (
 )
 from bolfi_liquids.online.record import BAD_FIT, sentence
 from bolfi_liquids.online.settings import OnlineSettings
-from bolfi_liquids.pouring.result import Judged
+from bolfi_liquids.pouring.spillage import Judged
 from bolfi_liquids.simulators import stir_simulator
 
 ATTRS = {

@@ -268,7 +268,7 @@ def test_a_pour_that_is_not_the_run_s_own_is_refused(pour):
     )
     for other in others:
         with pytest.raises(ValueError, match="another pour"):
-            replace(pour, chosen=other).check_current(Run.open(pour.path))
+            replace(pour, chosen=other).check_current(bl.Pour.open(pour.path))
 
 
 def test_a_run_without_a_pour_says_how_to_choose_one(calibration):

@@ -5,9 +5,8 @@ import pytest
 
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.pouring.design import (
+from bolfi_liquids.pouring.pours import (
     RATE,
-    acting_in_pours,
     box_around,
     joint_prior,
     whole,
@@ -89,8 +88,9 @@ def test_a_posterior_as_narrow_as_can_be_has_a_box_with_pours_in_it():
 
 
 def test_only_effects_of_pours_are_inputs():
-    names = ["camera_tilt", "yield_stress", "adhesion", "gripper_scale"]
-    assert acting_in_pours(names) == ("adhesion", "yield_stress")
+    names = ["camera_tilt", "yield_stress", "adhesion", "gripper_scale", "viscosity"]
+    prior = joint_prior(default_prior(), names, bundled_cups())
+    assert prior.names == ("viscosity", "cohesion", "adhesion", "yield_stress", RATE)
 
 
 def test_pours_of_like_viscosity_and_duration_come_together():

@@ -15,7 +15,7 @@ from bolfi_liquids import inference, models
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.cups import bundled_cups
-from bolfi_liquids.pouring.draining import Draining, hold_of
+from bolfi_liquids.pouring.pours import Draining, hold_of
 from bolfi_liquids.reporting.warnings import Results, warnings_of
 from bolfi_liquids.run.given_pours import GIVEN_POURS, digest_of_pours, keep_pours, kept_pours
 from bolfi_liquids.run.run import Run

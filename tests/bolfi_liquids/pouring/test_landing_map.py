@@ -11,10 +11,9 @@ from bolfi_liquids import inference, models
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.inputs.settings import PRIOR_POURS
-from bolfi_liquids.pouring.design import Box, joint_prior, whole
-from bolfi_liquids.pouring.landed_pours import Parcels, Poured, pours_in
 from bolfi_liquids.pouring.landing_map import learn_map
-from bolfi_liquids.pouring.parcels import PARCELS
+from bolfi_liquids.pouring.parcels import PARCELS, Parcels
+from bolfi_liquids.pouring.pours import Box, Poured, joint_prior, pours_in, whole
 from bolfi_liquids.pouring.spillage import landing_sd
 from bolfi_liquids.simulators import PourSimulator
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import chi2
 
 from bolfi_liquids.criticism.pour_noise import ACTION_STEP, REPEATABILITY_SD, action_coordinates
-from bolfi_liquids.pouring.residual import (
+from bolfi_liquids.pouring.given import (
     Residual,
     angle,
     expected_share,

@@ -1,13 +1,15 @@
 """Arguments mean the same in `record` and in `execute_pour`."""
 
+from types import SimpleNamespace
+
 import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids import hardware
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.rigs import rig_of
+from bolfi_liquids.online.record import Learning
 from bolfi_liquids.robot.armed_session import EMULATED_VISCOSITY, hidden_liquid
-from bolfi_liquids.robot.live_view import SessionView
 
 
 def test_an_emulated_liquid_may_be_given_or_left_to_the_emulator():
@@ -43,15 +45,15 @@ def test_a_copy_of_a_rig_is_checked_before_anybody_is_asked(tmp_path, section, n
         rig_of({"robot": 1})  # pyright: ignore
 
 
-@pytest.mark.parametrize("shown", [False, True])
-def test_what_went_wrong_is_logged_once_whether_a_view_is_shown_or_not(caplog, capsys, shown):
-    with SessionView("stirring", shown=shown) as view:
-        for _ in range(3):
-            view.warn("calibration failed: no memory")
+def test_what_went_wrong_while_learning_is_logged_once(caplog):
+    status = SimpleNamespace(phase="failed", detail="no memory")
+    view = SimpleNamespace(show=lambda: None)
+    learning = Learning(SimpleNamespace(status=status))
+    for _ in range(3):
+        learning._take(None, view)
     (record,) = caplog.records
     assert record.getMessage() == "calibration failed: no memory"
     assert record.levelname == "WARNING"
-    assert capsys.readouterr().err.count("no memory") <= 1  # by the command line's handler
 
 
 @pytest.mark.parametrize("emulate", [False, True])

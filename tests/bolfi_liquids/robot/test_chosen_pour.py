@@ -48,8 +48,8 @@ def refused(*_):
 def test_the_action_is_that_of_pour_nc_to_the_last_digit(poured_run):
     chosen = bl.Pour.open(poured_run).chosen
     planned = chosen_in(poured_run)
-    assert planned.judged.action == chosen.action
-    path = plan_pour(planned, bundled_rig())
+    assert planned.pour.chosen.action == chosen.action
+    (path,) = plan_pour(planned, bundled_rig()).paths
     turned = path.pose[:, 3:]
     assert np.ptp(turned, axis=0).max() > 1.0  # it does pour
 
@@ -95,7 +95,7 @@ def test_both_ends_of_what_the_cups_allow_may_be_poured(poured_run):
     for name, ends in ranges.items():
         for value in ends:
             with_action(poured_run, **{name: value})
-            assert chosen_in(poured_run).judged.action[name] == value
+            assert chosen_in(poured_run).pour.chosen.action[name] == value
 
 
 @pytest.mark.parametrize("made_from", [{"after": "another"}, {"given": "other pours"}])
@@ -177,7 +177,7 @@ def test_a_person_reads_the_pour_and_the_warnings_before_the_question(poured_run
         bl.execute_pour(poured_run, ask=ask)
     (plan,) = read
     chosen = chosen_in(poured_run)
-    judged = chosen.judged
+    judged = chosen.pour.chosen
     for text in (
         f"{np.degrees(judged.angular_velocity):.1f} deg/s",
         f"{100 * judged.distance:.2f} cm",

@@ -29,7 +29,7 @@ def test_a_robot_that_does_not_answer_leaves_no_directory(task):
     for _ in range(2):  # the second try is not refused for what the first has left
         with pytest.raises(hardware.RigError, match="no controller answers"), session(task) as one:
             assert task.out.exists()
-            one.pose()
+            one.session.pose()
         assert not task.out.exists()
 
 
@@ -46,7 +46,7 @@ def test_what_has_moved_is_kept(task):
         log = EventLog(task.out, "control")
         log.write("began", number=0)
         log.close()
-        one.pose()
+        one.session.pose()
     assert (task.out / "rig.json").exists()
 
 

@@ -1,5 +1,6 @@
 """The order in which the paths of a stir are followed and awaited."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -84,6 +85,6 @@ def test_data_are_handed_over_after_strokes_alone(monkeypatch):
     monkeypatch.setattr(record, "FOLLOWED_AFTER", 0.0)
     monkeypatch.setattr(record, "_so_far", lambda *_: len(session.ordered))
     calibration = SimpleNamespace(update=handed.append, status=SimpleNamespace(detail=""))
-    view = SimpleNamespace(show=lambda _: None)
-    follow_plan(session, PLAN, record._Learning(session, calibration, view).wait)
+    view = SimpleNamespace(session=session, show=lambda: None)
+    follow_plan(session, PLAN, partial(record.Learning(calibration).wait, view))
     assert len(handed) == len(PLAN.strokes)

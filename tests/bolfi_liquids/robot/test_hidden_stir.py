@@ -8,7 +8,7 @@ from bolfi_liquids.hardware.motion import joined
 import bolfi_liquids as bl
 from bolfi_liquids import hardware, models
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.robot.hidden_stir import with_stir
+from bolfi_liquids.robot.record import with_stir
 from bolfi_liquids.robot.stir import plan_stir
 
 RIG = hardware.bundled_rig()
