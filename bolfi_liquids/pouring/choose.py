@@ -94,7 +94,15 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     if table is not None:
         check_scene(table, cups)
     with Run.entered(calibration) as run:
-        latest = _posterior_of(calibration, run)
+        latest, own = calibration_to_pour(run), calibration
+        if isinstance(own, Criticism):
+            own = own.calibration
+        if isinstance(own, Calibration) and own.key != latest.key:
+            raise InputError(
+                "holds another posterior: a criticism has added to it, or draws were changed",
+                where=str(run.path),
+                fix="give the RUN directory",
+            )
         if not force:
             refuse_bad_fit(latest.summary, run.path)
         counted = _counted(run.path, cups, table)
@@ -111,25 +119,6 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         }
         run.keep("pour", pour.tree, made_from, pour.summary.to_json())
         return pour
-
-
-def _posterior_of(given: RunOrPath, run: Run) -> Calibration:
-    """The latest posterior of a run, as it was given or as the run holds it.
-
-    Raises:
-        InputError: What was given is not the latest: its pour would be out of date at once.
-    """
-    if isinstance(given, Criticism):
-        given = given.calibration
-    if not isinstance(given, Calibration):
-        return calibration_to_pour(run)
-    if given.key != run.posterior_key():
-        raise InputError(
-            "holds another posterior: a criticism has added to it, or draws were changed",
-            where=str(run.path),
-            fix="give the RUN directory",
-        )
-    return given
 
 
 def _counted(run: Path, cups: "Cups", given: PourTable | None) -> PourTable | None:

@@ -131,33 +131,31 @@ def box_around(prior: "Prior", draws: Mapping[str, NDArray], best: Mapping[str, 
         draws: Posterior draws of its liquids, name -> (n,), and of other parameters.
         best: Parameters that must lie inside, likewise.
     """
+    from ..inference import Prior
     from ..models import EFFECTS
 
-    low, high = np.quantile(_quantiles(prior, draws), [TAIL, 1.0 - TAIL], axis=0)
+    *names, rate = prior.names
+    assert rate == RATE
+    liquid = Prior({name: prior.distributions[name] for name in names})
+
+    def quantiles(of: "Mapping[str, ArrayLike]") -> NDArray[np.float64]:
+        return liquid.to_unit({name: np.atleast_1d(of[name]) for name in names})
+
+    low, high = np.quantile(quantiles(draws), [TAIL, 1.0 - TAIL], axis=0)
     margin = MARGIN * (high - low)
     # pours without an effect are pours with its neutral coefficient
-    neutral = {name: EFFECTS[name].neutral for name in prior.names if name in EFFECTS}
-    inside = _quantiles(prior, best), _quantiles(prior, {**best, **neutral})
+    neutral = {name: EFFECTS[name].neutral for name in names if name in EFFECTS}
+    inside = quantiles(best), quantiles({**best, **neutral})
     points = np.concatenate([[low - margin], [high + margin], *inside])
     # the least box of whole cells that holds all of them, within all quantiles
     first = np.clip(np.floor(points.min(axis=0) * CELLS), 0, CELLS - 1)
     last = np.clip(np.ceil(points.max(axis=0) * CELLS), first + 1, CELLS)
-    low, high = first / CELLS, last / CELLS
-    rate = prior.names.index(RATE)
-    low[rate], high[rate] = 0.0, 1.0
+    low, high = np.append(first / CELLS, 0.0), np.append(last / CELLS, 1.0)
     while np.prod(high - low) < MIN_VOLUME:
         narrow = np.argmin(high - low)
         low[narrow] = max(0.0, low[narrow] - 1.0 / CELLS)
         high[narrow] = min(1.0, high[narrow] + 1.0 / CELLS)
     return Box(prior, low, high)
-
-
-def _quantiles(prior: "Prior", liquids: "Mapping[str, ArrayLike]") -> NDArray[np.float64]:
-    """Of liquids (n, d), at the middle angular velocity."""
-    middle = float(prior.from_unit(np.full(len(prior), 0.5))[RATE])
-    named = {name: np.atleast_1d(liquids[name]) for name in prior.names if name != RATE}
-    count = len(named["viscosity"])
-    return prior.to_unit({**named, RATE: np.full(count, middle)})
 
 
 class Poured(NamedTuple):

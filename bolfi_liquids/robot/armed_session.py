@@ -169,6 +169,26 @@ def armed_session(
                 yield SessionView(session, title, 1 + len(task.paths), console, live)
 
 
+@contextmanager
+def told_on_stop(left: Callable[[], str]) -> Iterator[None]:
+    """Say what a session has left where it is stopped within.
+
+    Args:
+        left: What there is to find, or that nothing had moved.
+
+    Raises:
+        SessionStopped: It was stopped, or interrupted; the message ends with what is left.
+    """
+    from ..hardware import SessionInterrupted, SessionStopped
+
+    try:
+        yield
+    except SessionStopped as err:
+        raise SessionStopped(f"{err}; {left()}") from None
+    except KeyboardInterrupt:
+        raise SessionInterrupted(f"interrupted, the arm was stopped; {left()}") from None
+
+
 def dry_run(task: Task) -> "tuple[str, list[Check]]":
     """The plan, and the pre-flight list of a session that cannot move the arm.
 

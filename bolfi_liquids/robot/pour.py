@@ -17,7 +17,7 @@ from ..pouring.result import Pour
 from ..reporting.warnings import Results, warnings_of
 from ..run.run import RESULTS, Run, RunOrPath
 from ..wording import at_most, spilled
-from .armed_session import Ask, Task, armed_session, check_consent, dry_run
+from .armed_session import Ask, Task, armed_session, check_consent, dry_run, told_on_stop
 
 if TYPE_CHECKING:
     from ..hardware import Check, HiddenLiquid, Rig
@@ -61,7 +61,7 @@ def execute_pour(
         MotionRejected: The motion breaks one of the rig's limits.
         SessionStopped: The arm was stopped.
     """
-    from ..hardware import SessionInterrupted, emulated
+    from ..hardware import emulated
     from ..hardware.motion import approach_pour, ready_to_pour
 
     check_consent(ask, emulate, "execute_pour")
@@ -79,14 +79,14 @@ def execute_pour(
                 logger.warning(BAD_FIT)
             logger.info(chosen.expected)
             by = emulated(rig, ready_to_pour(rig, **chosen.place), tool="pouring")
-        try:
-            with armed_session(task, by, progress=progress) as view:
-                session, (path,) = view.session, task.paths
-                session.follow(approach_pour(rig, session.pose(), **chosen.place))
-                view.until_done(session.follow(path))
-        except KeyboardInterrupt:
-            left = f"look at {task.out}" if task.out.exists() else "nothing had moved"
-            raise SessionInterrupted(f"interrupted, the arm was stopped; {left}") from None
+
+        def left() -> str:
+            return f"look at {task.out}" if task.out.exists() else "nothing had moved"
+
+        with told_on_stop(left), armed_session(task, by, progress=progress) as view:
+            session, (path,) = view.session, task.paths
+            session.follow(approach_pour(rig, session.pose(), **chosen.place))
+            view.until_done(session.follow(path))
         return task.out
 
 

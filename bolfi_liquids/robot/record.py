@@ -1,7 +1,7 @@
 """Recording a stir: the arm, the cameras, and the recording that they leave."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -26,6 +26,7 @@ from .armed_session import (
     check_consent,
     dry_run,
     hidden_liquid,
+    told_on_stop,
 )
 from .stir import StirPlan, follow_plan, plan_stir
 
@@ -155,16 +156,17 @@ def with_stir(rig: "Rig", plan: StirPlan, liquid: "HiddenLiquid") -> "HiddenLiqu
     try:
         batch = batch_of(of, {}, 0, liquid.seed)
         (inclination,) = simulated(stir_simulator([expected], 0), batch, Compute())
-        if not np.isfinite(inclination).all():
-            raise RuntimeError("its result is not finite")
+        fault = "" if np.isfinite(inclination).all() else "its result is not finite"
     except InputError as err:
         raise InputError(err.what, where=f"emulated {err.where}", fix=err.fix) from err
     except RuntimeError as err:
+        fault = str(err)
+    if fault:
         raise InputError(
-            f"{liquid.viscosity:g} Pa s cannot be stirred along the rig's path: {err}",
+            f"{liquid.viscosity:g} Pa s cannot be stirred along the rig's path: {fault}",
             where="emulated viscosity",
             fix="give another viscosity, or another path under [stirring] of rig.toml",
-        ) from err
+        )
     return replace(liquid, stir=StickMotion(path.time, path.position, inclination))
 
 
@@ -231,21 +233,9 @@ def finished(directory: Path) -> Recording:
     return recording
 
 
-@contextmanager
-def save_on_stop(directory: Path) -> Iterator[None]:
-    """Save the frames taken before a stop as a recording.
-
-    Raises:
-        SessionStopped: It was stopped, or interrupted; the message says what was recorded.
-    """
-    from ..hardware import SessionInterrupted, SessionStopped
-
-    try:
-        yield
-    except SessionStopped as err:
-        raise SessionStopped(f"{err}; {_left(directory)}") from None
-    except KeyboardInterrupt:
-        raise SessionInterrupted(f"interrupted, the arm was stopped; {_left(directory)}") from None
+def save_on_stop(directory: Path) -> AbstractContextManager[None]:
+    """Save the frames taken before a stop as a recording; see `told_on_stop`."""
+    return told_on_stop(partial(_left, directory))
 
 
 def _left(directory: Path) -> str:
