@@ -92,20 +92,6 @@ class OnlinePhase(StrEnum):
     FAILED = "failed"
 
 
-class Status(NamedTuple):
-    """How an online calibration is doing.
-
-    Attributes:
-        phase: What it is doing.
-        detail: What is being prepared, or what is wrong; "" if nothing is.
-        simulations: Finished, failed ones included.
-    """
-
-    phase: OnlinePhase
-    detail: str
-    simulations: int
-
-
 class OnlineCalibration:
     """An online calibration under way; made by `start`, closed by `close` or a `with`.
 
@@ -114,6 +100,9 @@ class OnlineCalibration:
         plan: The planned stir.
         ends: When each of its strokes ends [s].
         out: The RUN directory that `finish` makes.
+        phase: What it was doing at the last `poll`.
+        detail: What is being prepared, or what is wrong; "" if nothing is.
+        made: Finished simulations, failed ones included.
         estimates: All so far.
     """
 
@@ -137,14 +126,14 @@ class OnlineCalibration:
         self.settings, self.out = problem.settings, out
         (self.plan,) = problem.stirring.recordings
         self.ends = stroke_ends(self.plan)
+        self.made: Made = ()
         self.estimates: list[OnlineEstimate] = []
-        self._phase = OnlinePhase.PREPARING
-        self._detail = "learning the map of landings, and simulating the plan"
+        self.phase = OnlinePhase.PREPARING
+        self.detail = "learning the map of landings, and simulating the plan"
         self._problem, self._learn_pours, self._simulate_plan = problem, learn_pours, simulate
         self._map: LandingMap | None = None
         self._unread: PartialRecording | None = None
         self._aligned: Aligned | None = None  # the data that were learned from last
-        self._made: Made = ()
         self._learning: tuple[Future, Callable[[Any], None]] | None = None  # task, and what follows
         self._simulating: Future[Made] | None = None
         self._no_more = ""  # why nothing is simulated any more
@@ -209,29 +198,24 @@ class OnlineCalibration:
             simulate = partial(simulate_plan, problem.stirring, bank, batch)
             return cls(problem, out, learn, simulate, resources)
 
-    @property
-    def status(self) -> Status:
-        """How it was doing at the last `poll`."""
-        return Status(self._phase, self._detail, len(self._made))
-
     def wait_until_ready(self, timeout: float = float("inf")) -> bool:
         """Wait until data may come, or preparation failed, or `timeout` [s] has passed.
 
         Returns:
-            Whether it is ready; if not, `status` says why.
+            Whether it is ready; if not, `detail` says why.
         """
         until = time.monotonic() + timeout
-        while self._phase is OnlinePhase.PREPARING and time.monotonic() < until:
+        while self.phase is OnlinePhase.PREPARING and time.monotonic() < until:
             time.sleep(POLL_SECONDS)
             self.poll()
-        return self._phase is OnlinePhase.READY
+        return self.phase is OnlinePhase.READY
 
     def update(self, so_far: PartialRecording) -> OnlineEstimate | None:
         """Hand over the recording so far, at best after each stroke; returns at once.
 
         What was not looked at yet is replaced. Data of an arm that is off its plan by more than
         `plan.MAX_OFF_PLAN`, or whose delay changed by more than `plan.MAX_DELAY_CHANGE` in a
-        stroke, are not learned from: `status` says so.
+        stroke, are not learned from: `phase` and `detail` say so.
 
         Returns:
             As `poll`.
@@ -245,7 +229,7 @@ class OnlineCalibration:
         Returns:
             The estimate that was finished, if one was.
         """
-        if self._phase is OnlinePhase.FAILED:
+        if self.phase is OnlinePhase.FAILED:
             return None
         before = len(self.estimates)
         try:
@@ -256,10 +240,10 @@ class OnlineCalibration:
             if self._learning is None:
                 self._go_on()
         except BrokenExecutor:
-            self._phase = OnlinePhase.FAILED
-            self._detail = "the process that learns has died; the recording goes on"
+            self.phase = OnlinePhase.FAILED
+            self.detail = "the process that learns has died; the recording goes on"
         except Exception as error:
-            self._phase, self._detail = OnlinePhase.FAILED, f"{type(error).__name__}: {error}"
+            self.phase, self.detail = OnlinePhase.FAILED, f"{type(error).__name__}: {error}"
         return self.estimates[-1] if len(self.estimates) > before else None
 
     def finish(self, recording: Source, *, budget: int = 20, progress: bool = True) -> Path:
@@ -303,18 +287,18 @@ class OnlineCalibration:
 
     def _go_on(self) -> None:
         """Order what the process that learns is to do next, if there is something."""
-        if self._phase is OnlinePhase.PREPARING:
+        if self.phase is OnlinePhase.PREPARING:
             if self._simulating is None:  # the design is there
-                self._phase, self._detail = OnlinePhase.READY, ""
+                self.phase, self.detail = OnlinePhase.READY, ""
         elif self._unread is not None:
             so_far, self._unread = self._unread, None
             known = 0 if self._aligned is None else self._aligned.strokes
-            state = self._problem, self._made, self._map, known, so_far
+            state = self._problem, self.made, self._map, known, so_far
             self._learn(self._answered, answer, *state)
         elif self._aligned is not None and self._simulating is None and not self._no_more:
-            n = min(self.settings.in_flight, self.settings.budget - len(self._made))
+            n = min(self.settings.in_flight, self.settings.budget - len(self.made))
             if n > 0:
-                state = self._problem, self._made, self._aligned.observed, n
+                state = self._problem, self.made, self._aligned.observed, n
                 self._learn(self._simulate, proposals, *state)
 
     def _designed(self, jobs: "list[Job]") -> None:
@@ -331,8 +315,8 @@ class OnlineCalibration:
             self.estimates.append(found.estimate)
             with (self.out / LOG).open("a", encoding="utf-8") as log:
                 log.write(json.dumps(found.estimate.as_record()) + "\n")
-        self._phase = OnlinePhase.REFUSED if found.refusal else OnlinePhase.READY
-        self._detail = found.refusal or self._no_more
+        self.phase = OnlinePhase.REFUSED if found.refusal else OnlinePhase.READY
+        self.detail = found.refusal or self._no_more
         self._aligned = found.aligned or self._aligned
 
     def _simulate(self, jobs: "list[Job]") -> None:
@@ -347,13 +331,13 @@ class OnlineCalibration:
             return
         future, self._simulating = self._simulating, None
         try:
-            self._made += future.result()
+            self.made += future.result()
         except BrokenExecutor:  # the others are enough for estimates
             self._no_more = "the process that simulates has died"
         except Exception as error:
             self._no_more = f"the plan cannot be simulated: {type(error).__name__}: {error}"
         if not self._no_more:
             return
-        if self._phase is OnlinePhase.PREPARING:
-            self._phase, self._detail = OnlinePhase.FAILED, self._no_more
-        self._detail = self._detail or self._no_more
+        if self.phase is OnlinePhase.PREPARING:
+            self.phase, self.detail = OnlinePhase.FAILED, self._no_more
+        self.detail = self.detail or self._no_more

@@ -69,7 +69,7 @@ def record_online(
     path, attrs = _simulated(stir.plan), rig_attributes(stir.task.rig)
     with OnlineCalibration.start(path, attrs, online, progress=progress) as calibration:
         if not calibration.wait_until_ready():
-            raise RuntimeError(f"the calibration is not ready: {calibration.status.detail}")
+            raise RuntimeError(f"the calibration is not ready: {calibration.detail}")
         learning, doing = Learning(calibration), "stirring and calibrating"
         recording = carried_out(stir, learning.wait, doing, progress=progress)
         calibration.finish(recording, progress=progress)
@@ -102,9 +102,9 @@ class Learning:
         return self.enough
 
     def _take(self, estimate: "OnlineEstimate | None", view: SessionView) -> None:
-        status = self.calibration.status
-        if status.detail and status.phase is not OnlinePhase.PREPARING:
-            self._warn(f"calibration {status.phase}: {status.detail}")
+        phase, detail = self.calibration.phase, self.calibration.detail
+        if detail and phase is not OnlinePhase.PREPARING:
+            self._warn(f"calibration {phase}: {detail}")
         if estimate is not None:
             self.enough = estimate.is_enough(self.calibration.settings)
             if not estimate.fits:

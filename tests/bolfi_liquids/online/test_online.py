@@ -53,7 +53,7 @@ def start(recording, out, settings):
 def until(wanted, of):
     """Poll until `wanted` says so."""
     ends = time.monotonic() + PATIENCE_S
-    while not wanted() and of.status.phase != OnlinePhase.FAILED and time.monotonic() < ends:
+    while not wanted() and of.phase != OnlinePhase.FAILED and time.monotonic() < ends:
         time.sleep(0.01)
         of.poll()
     return wanted()
@@ -80,10 +80,15 @@ def replay(recording, of, *, realtime=False):
             of.poll()
         before = len(of.estimates)
         of.update(so_far(recording, end))
-        assert realtime or until(lambda before=before: len(of.estimates) > before, of), of.status
+        assert realtime or until(lambda before=before: len(of.estimates) > before, of), of.detail
         if any(one.is_enough(of.settings) for one in of.estimates[-1:]):
             break
     return of.estimates
+
+
+def now(of):
+    """How it is doing."""
+    return SimpleNamespace(phase=of.phase, detail=of.detail, simulations=len(of.made))
 
 
 def process(executor):
@@ -101,30 +106,30 @@ def story(short_recording, tmp_path_factory):
     started = start(recording, out, SMALL)
     told = SimpleNamespace(out=out, recording=recording)
     with started as of:
-        told.early = of.status
+        told.early = now(of)
         told.ready = of.wait_until_ready(PATIENCE_S)
-        told.status = of.status
+        told.status = now(of)
         of.update(so_far(recording, of.ends[0]))
         until(lambda: of._unread is None, of)
         of.update(so_far(recording, of.ends[1], off=0.01))  # waits, and is replaced
         of.update(so_far(recording, of.ends[1]))
-        told.phases = {of.status.phase}
-        assert until(lambda: told.phases.add(of.status.phase) or len(of.estimates) == 2, of)
+        told.phases = {of.phase}
+        assert until(lambda: told.phases.add(of.phase) or len(of.estimates) == 2, of)
         told.estimates = list(of.estimates)
-        until(lambda: of.status.simulations > SMALL.design, of)
-        told.later = of.status
+        until(lambda: len(of.made) > SMALL.design, of)
+        told.later = now(of)
         told.learner, told.simulator = process(of._learner), process(of._simulator)
         of.update(so_far(recording, of.ends[2], off=0.01))
-        until(lambda: of.status.phase == OnlinePhase.REFUSED, of)
-        told.refused = of.status
+        until(lambda: of.phase == OnlinePhase.REFUSED, of)
+        told.refused = now(of)
         os.kill(told.simulator.pid, signal.SIGKILL)
         of.update(so_far(recording, of.ends[2]))
-        until(lambda: len(of.estimates) > 2 and "died" in of.status.detail, of)
-        told.alone, told.last = of.status, of.estimates[-1]
+        until(lambda: len(of.estimates) > 2 and "died" in of.detail, of)
+        told.alone, told.last = now(of), of.estimates[-1]
         os.kill(told.learner.pid, signal.SIGKILL)
         told.after = of.update(so_far(recording, of.ends[2]))
-        until(lambda: of.status.phase == OnlinePhase.FAILED, of)
-        told.dead = of.status
+        until(lambda: of.phase == OnlinePhase.FAILED, of)
+        told.dead = now(of)
     return told
 
 
@@ -228,8 +233,8 @@ def test_a_plan_that_cannot_be_simulated_is_told_before_the_map_is_learned(
     long, refuse = partial(time.sleep, 2 * PATIENCE_S), int  # of a list of jobs: a TypeError
     with OnlineCalibration(problem, tmp_path, long, refuse, ExitStack()) as of:
         assert not of.wait_until_ready(PATIENCE_S)
-        assert of.status.phase is OnlinePhase.FAILED
-        assert "cannot be simulated" in of.status.detail
+        assert of.phase is OnlinePhase.FAILED
+        assert "cannot be simulated" in of.detail
 
 
 @pytest.mark.slow
@@ -249,7 +254,7 @@ def finish(short_recording, tmp_path_factory):
         out = tmp_path_factory.mktemp("online") / "run"
         settings = replace(SMALL, budget=8, target=target, least_strokes=1)
         with start(recording, out, settings) as of:
-            assert of.wait_until_ready(PATIENCE_S), of.status
+            assert of.wait_until_ready(PATIENCE_S), of.detail
             estimates = replay(recording, of)
             return estimates, of.finish(recording, budget=8, progress=False)
 
@@ -295,10 +300,10 @@ def test_the_last_estimate_agrees_with_the_ordinary_calibration(tmp_path):
     with as_file(files("bolfi_liquids.data") / "glycerin_v10.nc") as path:
         recording = bl.open_recording(path)
         with start(recording, tmp_path / "run", OnlineSettings(target=1e-9)) as of:
-            assert of.wait_until_ready(600), of.status
+            assert of.wait_until_ready(600), of.detail
             estimates = replay(recording, of, realtime=True)
-            assert until(lambda: estimates[-1].strokes == len(of.ends), of), of.status
-            assert until(lambda: of.status.simulations > 16, of)
+            assert until(lambda: estimates[-1].strokes == len(of.ends), of), of.detail
+            assert until(lambda: len(of.made) > 16, of)
             ordinary = bl.Calibration.open(of.finish(recording, progress=False))
     last = estimates[-1].parameters["viscosity"]
     other = ordinary.summary.parameters["viscosity"]

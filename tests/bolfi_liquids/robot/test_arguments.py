@@ -46,9 +46,8 @@ def test_a_copy_of_a_rig_is_checked_before_anybody_is_asked(tmp_path, section, n
 
 
 def test_what_went_wrong_while_learning_is_logged_once(caplog):
-    status = SimpleNamespace(phase="failed", detail="no memory")
     view = SimpleNamespace(show=lambda: None)
-    learning = Learning(SimpleNamespace(status=status))
+    learning = Learning(SimpleNamespace(phase="failed", detail="no memory"))
     for _ in range(3):
         learning._take(None, view)
     (record,) = caplog.records

@@ -84,7 +84,7 @@ def test_data_are_handed_over_after_strokes_alone(monkeypatch):
     handed, session = [], Done()
     monkeypatch.setattr(record, "FOLLOWED_AFTER", 0.0)
     monkeypatch.setattr(record, "_so_far", lambda *_: len(session.ordered))
-    calibration = SimpleNamespace(update=handed.append, status=SimpleNamespace(detail=""))
+    calibration = SimpleNamespace(update=handed.append, phase="ready", detail="")
     view = SimpleNamespace(session=session, show=lambda: None)
     follow_plan(session, PLAN, partial(record.Learning(calibration).wait, view))
     assert len(handed) == len(PLAN.strokes)
