@@ -207,7 +207,7 @@ def estimate(
     fit = engine.fit(warn=False)  # warnings are among the estimate's complaints
     seed, (plan,) = problem.settings.seed, problem.stirring.recordings
     tree = fit.sample("quadrature", chains=2, draws=DRAWS_EACH, seed=seed, warn=False)
-    posterior = tree["posterior"]
+    posterior = tree["posterior"].to_dataset()
     status = str(posterior.attrs["status"])
     draws = {name: posterior[name].to_numpy().ravel() for name in problem.prior.names}
     pour = landing_map.best(draws)

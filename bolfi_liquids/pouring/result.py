@@ -89,7 +89,8 @@ class Pour:
     def made(cls, run: Run, tree: "DataTree") -> "Pour":
         """The pour of a run from its pour.nc."""
         summary = PourSummary.from_json(json.loads(tree.attrs["summary"]))
-        return cls(run, _judged(tree["chosen"]), _judged(tree["plug_in"]), tree, summary)
+        chosen, plug_in = (_judged(tree[name].to_dataset()) for name in ("chosen", "plug_in"))
+        return cls(run, chosen, plug_in, tree, summary)
 
     @property
     def path(self) -> Path:
@@ -119,7 +120,7 @@ class Pour:
             )
 
 
-def _judged(outcomes: "DataTree") -> Judged:
+def _judged(outcomes: "Dataset") -> Judged:
     """The action in one of the groups `chosen` and `plug_in`."""
     columns = [outcomes[fraction].to_numpy() for fraction in FRACTIONS]
     action = {name: float(outcomes.attrs[name]) for name in ACTION}

@@ -152,16 +152,16 @@ def with_stir(rig: "Rig", plan: StirPlan, liquid: "HiddenLiquid") -> "HiddenLiqu
         return liquid
     path = servoed(joined(list(plan.strokes)))
     expected = planned_recording(path.time, path.position, rig_attributes(rig))
+    inclination, fault = np.full((1, 2), np.nan), "its result is not finite"
     of = {"viscosity": liquid.viscosity, "cohesion": COHESION, "density": rig.liquid.density}
     try:
         batch = batch_of(of, {}, 0, liquid.seed)
         (inclination,) = simulated(stir_simulator([expected], 0), batch, Compute())
-        fault = "" if np.isfinite(inclination).all() else "its result is not finite"
     except InputError as err:
         raise InputError(err.what, where=f"emulated {err.where}", fix=err.fix) from err
     except RuntimeError as err:
         fault = str(err)
-    if fault:
+    if not np.isfinite(inclination).all():
         raise InputError(
             f"{liquid.viscosity:g} Pa s cannot be stirred along the rig's path: {fault}",
             where="emulated viscosity",

@@ -108,7 +108,7 @@ def story(short_recording, tmp_path_factory):
     with started as of:
         told.early = now(of)
         told.ready = of.wait_until_ready(PATIENCE_S)
-        told.status = now(of)
+        told.prepared = now(of)
         of.update(so_far(recording, of.ends[0]))
         until(lambda: of._unread is None, of)
         of.update(so_far(recording, of.ends[1], off=0.01))  # waits, and is replaced
@@ -134,14 +134,11 @@ def story(short_recording, tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_it_prepares_before_the_robot_moves(story):
+def test_it_prepares_and_then_answers_every_stroke(story):
     assert story.early.phase is OnlinePhase.PREPARING
-    assert story.ready and story.status.simulations == SMALL.design
-
-
-@pytest.mark.slow
-def test_every_stroke_is_answered(story):
+    assert story.ready and story.prepared.simulations == SMALL.design
     assert [one.strokes for one in story.estimates] == [1, 2]
+    assert story.phases == {OnlinePhase.READY}  # data that wait are replaced by newer ones
     for one in story.estimates:
         assert set(one.parameters) == {"viscosity", "cohesion"}
         for spread in one.parameters.values():
@@ -152,29 +149,16 @@ def test_every_stroke_is_answered(story):
 
 
 @pytest.mark.slow
-def test_data_that_wait_are_replaced_by_newer_ones(story):
-    assert story.phases == {OnlinePhase.READY}
-
-
-@pytest.mark.slow
-def test_simulations_go_on_while_the_robot_stirs(story):
-    assert story.later.simulations > SMALL.design
-
-
-@pytest.mark.slow
-def test_control_and_cameras_come_first_then_estimates(story):
+def test_control_and_cameras_come_first_and_only_the_learner_loads_jax(story):
     here = os.getpriority(os.PRIO_PROCESS, 0)
     assert story.learner.niceness == min(here + 5, 19)
     assert story.simulator.niceness == min(here + 10, 19)
-
-
-@pytest.mark.slow
-def test_only_the_process_that_learns_loads_jax(story):
     assert story.learner.jax and not story.simulator.jax
 
 
 @pytest.mark.slow
-def test_nothing_is_simulated_twice(story):
+def test_simulations_go_on_while_the_robot_stirs_and_none_is_made_twice(story):
+    assert story.later.simulations > SMALL.design
     connection = sqlite3.connect(story.out / online.BANK)
     rows = connection.execute("SELECT theta, seed FROM simulation").fetchall()
     connection.close()
@@ -193,21 +177,12 @@ def test_estimates_are_logged(story):
 
 
 @pytest.mark.slow
-def test_data_off_the_plan_are_refused_with_a_reason(story):
+def test_what_goes_wrong_is_told_and_disturbs_nobody(story):
     assert "mm off its plan" in story.refused.detail
-
-
-@pytest.mark.slow
-def test_without_its_simulator_it_goes_on(story):
-    assert story.last.strokes == 3
-    assert story.alone.phase is OnlinePhase.READY
+    # without its simulator it goes on
+    assert story.last.strokes == 3 and story.alone.phase is OnlinePhase.READY
     assert "simulates has died" in story.alone.detail
-
-
-@pytest.mark.slow
-def test_death_is_a_status_and_disturbs_nobody(story):
-    assert "learns has died" in story.dead.detail
-    assert story.after is None
+    assert "learns has died" in story.dead.detail and story.after is None
     running = {child.pid for child in active_children()}
     assert not running & {story.learner.pid, story.simulator.pid}
 
@@ -245,52 +220,20 @@ def test_a_run_is_not_overwritten(short_recording, tmp_path):
         OnlineCalibration.start(recording.gripper, recording.attrs, OnlineChoice(tmp_path))
 
 
-@pytest.fixture(scope="module")
-def finish(short_recording, tmp_path_factory):
-    """Replays the stir until a target is met, and calibrates; the estimates and the run."""
-    recording = bl.open_recording(short_recording)
-
-    def finish(target):
-        out = tmp_path_factory.mktemp("online") / "run"
-        settings = replace(SMALL, budget=8, target=target, least_strokes=1)
-        with start(recording, out, settings) as of:
-            assert of.wait_until_ready(PATIENCE_S), of.detail
-            estimates = replay(recording, of)
-            return estimates, of.finish(recording, budget=8, progress=False)
-
-    return finish
-
-
-@pytest.fixture(scope="module")
-def met(finish):
-    return finish(0.9)
-
-
 @pytest.mark.slow
-def test_stops_at_the_target(met):
-    estimates, run = met
-    strokes = [one.strokes for one in estimates]
-    assert strokes in ([1], [1, 2])  # of 3
+def test_stops_at_the_target_and_calibrates(short_recording, tmp_path):
+    recording = bl.open_recording(short_recording)
+    settings = replace(SMALL, budget=8, target=0.9, least_strokes=1)
+    with start(recording, tmp_path / "run", settings) as of:
+        assert of.wait_until_ready(PATIENCE_S), of.detail
+        estimates = replay(recording, of)
+        run = of.finish(recording, budget=8, progress=False)
+    assert [one.strokes for one in estimates] in ([1], [1, 2])  # of 3
     calibration = bl.Calibration.open(run)
     assert calibration.summary.n_simulations == 8
     last = estimates[-1].parameters["viscosity"]
     ordinary = calibration.summary.parameters["viscosity"]
     assert last.q05 < ordinary.q95 and ordinary.q05 < last.q95
-
-
-@pytest.mark.minutes  # the story above goes as far, without the calibration
-def test_stops_at_the_last_stroke(finish):
-    estimates, run = finish(1e-9)
-    assert [one.strokes for one in estimates] == [1, 2, 3]
-    assert bl.Calibration.open(run).summary.n_simulations == 8
-
-
-@pytest.mark.minutes  # other tests have it of a calibration that was never online
-def test_a_pour_is_chosen_and_reported_after_an_online_calibration(met):
-    _, run = met
-    small = {"pours": 24, "draws": 16, "force": True}  # eight simulations need not come near
-    pour = bl.choose_pour(bl.Calibration.open(run), progress=False, **small)
-    assert bl.report(run, moving=False).is_file() and 0.0 <= pour.chosen.expected_spillage <= 1.0
 
 
 @pytest.mark.minutes  # at full size; the test above has it of a small one

@@ -6,26 +6,8 @@ import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids import hardware
-from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.rigs import rig_of
 from bolfi_liquids.online.record import Learning
-from bolfi_liquids.robot.armed_session import EMULATED_VISCOSITY, hidden_liquid
-
-
-def test_an_emulated_liquid_may_be_given_or_left_to_the_emulator():
-    thick = hardware.HiddenLiquid(viscosity=7.0)
-    assert hidden_liquid(thick) is thick
-    assert hidden_liquid(False) is None
-    usual = hidden_liquid(True)
-    assert usual is not None and usual.viscosity == EMULATED_VISCOSITY
-
-
-def test_a_rig_may_be_itself_or_its_file_or_none(tmp_path):
-    bundled = hardware.bundled_rig()
-    assert rig_of(bundled) is bundled
-    assert rig_of(None) == bundled
-    with pytest.raises(ValueError, match=r"none\.toml"):
-        rig_of(tmp_path / "none.toml")
 
 
 @pytest.mark.parametrize(
@@ -41,8 +23,15 @@ def test_a_copy_of_a_rig_is_checked_before_anybody_is_asked(tmp_path, section, n
         bl.record(wrong, out=tmp_path / "out", ask=lambda plan: pytest.fail(plan))
     with pytest.raises(hardware.RigError, match=name):
         rig_of(wrong)
-    with pytest.raises(InputError, match="no rig"):
-        rig_of({"robot": 1})  # pyright: ignore
+
+
+def test_a_rig_may_be_itself_or_its_file_or_none(tmp_path):
+    bundled = hardware.bundled_rig()
+    assert rig_of(bundled) is bundled
+    assert rig_of(None) == bundled
+    for wrong in (tmp_path / "none.toml", {"robot": 1}):
+        with pytest.raises(ValueError, match=r"none\.toml|rig"):
+            rig_of(wrong)  # pyright: ignore
 
 
 def test_what_went_wrong_while_learning_is_logged_once(caplog):
