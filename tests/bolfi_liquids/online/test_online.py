@@ -66,22 +66,14 @@ def so_far(recording, end, off=0.0):
     return PartialRecording(recording.time[seen], path, recording.inclination[seen], now)
 
 
-def replay(recording, of, *, realtime=False):
-    """Estimates of a finished recording that is handed over stroke by stroke, until one is enough.
-
-    In real time strokes come as fast as they were made; else each waits for the estimate of the
-    one before.
-    """
-    began = time.monotonic()
+def replay(recording, of):
+    """Estimates of a finished recording that is handed over stroke by stroke, until one is enough;
+    each stroke waits for the estimate of the one before."""
     for end in of.ends:
-        arrives = began + end - recording.time[0]
-        while realtime and time.monotonic() < arrives:
-            time.sleep(0.02)
-            of.poll()
         before = len(of.estimates)
         of.update(so_far(recording, end))
-        assert realtime or until(lambda before=before: len(of.estimates) > before, of), of.detail
-        if any(one.is_enough(of.settings) for one in of.estimates[-1:]):
+        assert until(lambda before=before: len(of.estimates) > before, of), of.detail
+        if of.estimates[-1].is_enough(of.settings):
             break
     return of.estimates
 
@@ -234,21 +226,3 @@ def test_stops_at_the_target_and_calibrates(short_recording, tmp_path):
     last = estimates[-1].parameters["viscosity"]
     ordinary = calibration.summary.parameters["viscosity"]
     assert last.q05 < ordinary.q95 and ordinary.q05 < last.q95
-
-
-@pytest.mark.minutes  # at full size; the test above has it of a small one
-def test_the_last_estimate_agrees_with_the_ordinary_calibration(tmp_path):
-    from importlib.resources import as_file, files
-
-    with as_file(files("bolfi_liquids.data") / "glycerin_v10.nc") as path:
-        recording = bl.open_recording(path)
-        with start(recording, tmp_path / "run", OnlineSettings(target=1e-9)) as of:
-            assert of.wait_until_ready(600), of.detail
-            estimates = replay(recording, of, realtime=True)
-            assert until(lambda: estimates[-1].strokes == len(of.ends), of), of.detail
-            assert until(lambda: len(of.made) > 16, of)
-            ordinary = bl.Calibration.open(of.finish(recording, progress=False))
-    last = estimates[-1].parameters["viscosity"]
-    other = ordinary.summary.parameters["viscosity"]
-    assert estimates[-1].strokes == len(of.ends)
-    assert last.q05 < other["q95"] and other["q05"] < last.q95

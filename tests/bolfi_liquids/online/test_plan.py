@@ -40,8 +40,8 @@ def test_strokes_of_a_star_end_where_it_turns():
     np.testing.assert_allclose(np.hypot(*at), 0.025, atol=5e-3)
 
 
-@pytest.mark.parametrize("delay", [0.032, -0.02])
-def test_data_are_those_of_the_plan_up_to_the_last_finished_stroke(delay):
+def test_data_are_those_of_the_plan_up_to_the_last_finished_stroke():
+    delay = 0.032
     aligned = align(PLAN, ENDS, data(ENDS[3] + 0.2, delay=delay))
     assert (aligned.strokes, aligned.covered, aligned.refusal) == (4, ENDS[3], "")
     assert aligned.delay == pytest.approx(delay, abs=1e-3)
@@ -115,34 +115,23 @@ def test_what_the_cameras_missed_is_missing():
     assert missing[:, 1].sum() <= wanted.sum() + 2
 
 
-@pytest.mark.parametrize(
-    ("fault", "why"),
-    [
-        ({"off": 1.2 * MAX_OFF_PLAN}, "mm off its plan"),
-        ({"off": 0.7 * MAX_OFF_PLAN}, ""),
-        ({"delay": 1.2 * MAX_DELAY_CHANGE}, "lost 240 ms"),
-        ({"delay": -1.2 * MAX_DELAY_CHANGE}, "gained 240 ms"),
-        ({"delay": 0.8 * MAX_DELAY_CHANGE}, ""),
-    ],
-)
-def test_another_stir_is_refused_and_tracking_errors_are_not(fault, why):
-    refusal = align(PLAN, ENDS, data(ENDS[2] + 0.1, **fault)).refusal
-    assert why in refusal and bool(why) == bool(refusal)
+def test_another_stir_is_refused_and_tracking_errors_are_not():
+    rows = (
+        (data(ENDS[2] + 0.1, off=1.2 * MAX_OFF_PLAN), "mm off its plan"),
+        (data(ENDS[2] + 0.1, off=0.7 * MAX_OFF_PLAN), ""),
+        (data(ENDS[2] + 0.1, delay=1.2 * MAX_DELAY_CHANGE), "lost 240 ms"),
+        (data(ENDS[2] + 0.1, delay=-1.2 * MAX_DELAY_CHANGE), "gained 240 ms"),
+        (data(ENDS[2] + 0.1, delay=0.8 * MAX_DELAY_CHANGE), ""),
+        (data(2.0)._replace(position=np.full((250, 3), np.nan)), "positions"),
+    )
+    for seen, why in rows:
+        refusal = align(PLAN, ENDS, seen).refusal
+        assert why in refusal and bool(why) == bool(refusal), why
 
 
-def test_data_in_which_the_arm_was_not_seen_are_refused():
-    unseen = data(2.0)._replace(position=np.full((250, 3), np.nan))
-    assert align(PLAN, ENDS, unseen).refusal
-
-
-@pytest.mark.parametrize(
-    ("time", "attrs", "where"),
-    [
-        (PATH.time, {}, "attribute liquid_density"),
-        (PATH.time[::-1], ATTRS, "planned path"),
-    ],
-)
-def test_a_plan_needs_a_density_and_a_path(time, attrs, where):
-    with pytest.raises(InputError) as refused:
-        planned_recording(time, PATH.position, attrs)
-    assert where in refused.value.where
+def test_a_plan_needs_a_density_and_a_path():
+    rows = ((PATH.time, {}, "liquid_density"), (PATH.time[::-1], ATTRS, "planned path"))
+    for time, attrs, where in rows:
+        with pytest.raises(InputError) as refused:
+            planned_recording(time, PATH.position, attrs)
+        assert where in refused.value.where

@@ -7,10 +7,9 @@ import pytest
 from bolfi_liquids.inference.simulations import Compute
 from scipy.special import ndtr
 
-from bolfi_liquids import inference, models
+from bolfi_liquids import inference
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.inputs.settings import PRIOR_POURS
 from bolfi_liquids.pouring.landing_map import learn_map
 from bolfi_liquids.pouring.parcels import PARCELS, Parcels
 from bolfi_liquids.pouring.pours import Box, Poured, joint_prior, pours_in, whole
@@ -178,21 +177,3 @@ def test_liquids_beyond_the_box_are_taken_at_its_edge(made_up, bank):
     at = np.array([1.0])
     same = (learned.profiles(at, one, np.zeros(1, int)).fractions for one in (edge, far))
     np.testing.assert_allclose(*same, atol=1e-9)
-
-
-@pytest.mark.minutes
-def test_a_map_of_all_liquids_says_what_new_pours_spill(bank):
-    """Of liquids and seeds that it does not hold, as far as its own error says."""
-    rng = np.random.default_rng(5)
-    box = whole(joint_prior(default_prior(), (), CUPS))
-    learned = learn_map(box, CUPS, poured_in(bank, box, PRIOR_POURS))
-    drawn = default_prior().from_unit(rng.uniform(size=(24, 2)))
-    found = learned.surface({name: np.repeat(v, 4) for name, v in drawn.items()}, rates=5)
-    rate = found.angular_velocity[2]
-    made = models.landings(models.Liquid(**drawn, density=1000.0), rate, CUPS, np.arange(24))
-    off = landing_sd(CUPS) * rng.standard_normal((400, 1))
-    for column in (10, 30, 50):
-        poured = made.into(found.distance[column] + off, CUPS.receiver.radius).spilled.mean(axis=0)
-        missed = poured - found.spilled[:, 2, column].reshape(24, 4).mean(axis=1)
-        # an RMS of 24 errors is off by a seventh (sd)
-        assert np.sqrt(np.mean(missed**2)) < 1.6 * learned.rms_error

@@ -10,19 +10,11 @@ from bolfi_liquids.inputs.rigs import rig_of
 from bolfi_liquids.online.record import Learning
 
 
-@pytest.mark.parametrize(
-    ("section", "number"),
-    [("limits", {"speed": 2.0}), ("robot", {"stirring_orientation": (0.0, 0.0, 0.0)})],
-)
-def test_a_copy_of_a_rig_is_checked_before_anybody_is_asked(tmp_path, section, number):
+def test_a_copy_of_a_rig_is_checked_before_anybody_is_asked(tmp_path):
     rig = hardware.bundled_rig()
-    part = getattr(rig, section).model_copy(update=number)
-    wrong = rig.model_copy(update={section: part})
-    (name,) = number
-    with pytest.raises(hardware.RigError, match=name):
+    wrong = rig.model_copy(update={"limits": rig.limits.model_copy(update={"speed": 2.0})})
+    with pytest.raises(hardware.RigError, match="speed"):
         bl.record(wrong, out=tmp_path / "out", ask=lambda plan: pytest.fail(plan))
-    with pytest.raises(hardware.RigError, match=name):
-        rig_of(wrong)
 
 
 def test_a_rig_may_be_itself_or_its_file_or_none(tmp_path):
@@ -44,10 +36,10 @@ def test_what_went_wrong_while_learning_is_logged_once(caplog):
     assert record.levelname == "WARNING"
 
 
-@pytest.mark.parametrize("emulate", [False, True])
-def test_neither_or_both_of_ask_and_emulate_are_refused(tmp_path, emulate):
-    ask = (lambda plan: "") if emulate else None
-    with pytest.raises(ValueError, match="neither or both"):
-        bl.execute_pour(tmp_path, ask=ask, emulate=emulate)
-    with pytest.raises(ValueError, match="neither or both"):
-        bl.record(out=tmp_path / "out", ask=ask, emulate=emulate)
+def test_neither_or_both_of_ask_and_emulate_are_refused(tmp_path):
+    for consent in ({"ask": None, "emulate": False}, {"ask": lambda _: "", "emulate": True}):
+        with pytest.raises(ValueError, match="neither or both"):
+            bl.execute_pour(tmp_path, **consent)
+        with pytest.raises(ValueError, match="neither or both"):
+            bl.record(out=tmp_path / "out", **consent)
+    assert not (tmp_path / "out").exists()
