@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.summary import FitStatus
+from ..run.given_pours import UNITS
 from ..run.run import Run, RunOrPath
 from ..run.summary import Number, Section
 from ..wording import html_table
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
     from .landing_map import LandingMap
-
-ACTION_UNITS = {"angular_velocity": "rad s-1", "distance": "m"}
 
 INTERVAL = 0.05, 0.95
 """Quantiles of the fractions that arrive and stay."""
@@ -312,7 +311,7 @@ def _given(given: GivenPours) -> "Dataset":
     names = (*ACTION, *FRACTIONS, "expected_spilled", "expected_retained")
     values = (table.angular_velocity, table.distance, *table.fractions.T, *given.expected.T)
     columns = {
-        name: ("line", of, {"units": ACTION_UNITS.get(name, "1")})
+        name: ("line", of, {"units": UNITS.get(name, "1")})
         for name, of in zip(names, values, strict=True)
     }
     attributes = {"file": table.path.name, "liquid": table.liquid, "sha256": table.hash}
@@ -326,7 +325,7 @@ def _actions(surface: Surface, risk: str) -> "Dataset":
         "spilled": (("draw", *ACTION), surface.spilled.astype(np.float32)),
         "risk": (ACTION, surface.risk(risk)),
     }
-    axes = {name: (name, getattr(surface, name), {"units": ACTION_UNITS[name]}) for name in ACTION}
+    axes = {name: (name, getattr(surface, name), {"units": UNITS[name]}) for name in ACTION}
     return Dataset(columns, axes)
 
 

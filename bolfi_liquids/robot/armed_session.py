@@ -13,13 +13,12 @@ from rich.live import Live
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from ..hardware import Check, EmulatedRig, HiddenLiquid, Rig, Session, Tool
+    from ..hardware import Check, EmulatedRig, Rig, Session, Tool
     from ..hardware.motion import PosePath
 
 Ask = Callable[[str], str]
 """Shows a person the plan, and returns what the person typed."""
 
-EMULATED_VISCOSITY = 1.0  # Pa s, of a liquid of which nothing is said
 REFRESH_RATE = 5.0  # per second, of the live view
 
 
@@ -47,15 +46,6 @@ class Task(NamedTuple):
         from ..hardware.session.confirmation import describe
 
         return f"{self.about}\n{describe(self.paths, self.rig, self.tool)}".lstrip()
-
-
-def hidden_liquid(emulate: "HiddenLiquid | bool") -> "HiddenLiquid | None":
-    """What `emulate` stands for: a liquid, the usual one for True, none for False."""
-    from ..hardware import HiddenLiquid
-
-    if isinstance(emulate, bool):
-        return HiddenLiquid(viscosity=EMULATED_VISCOSITY) if emulate else None
-    return emulate
 
 
 def check_consent(ask: Ask | None, emulate: object, where: str) -> None:

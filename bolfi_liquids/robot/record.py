@@ -25,7 +25,6 @@ from .armed_session import (
     armed_session,
     check_consent,
     dry_run,
-    hidden_liquid,
     told_on_stop,
 )
 from .stir import StirPlan, follow_plan, plan_stir
@@ -99,10 +98,13 @@ def prepare_stir(
     cycles: int | None,
 ) -> PlannedStir:
     """Check and plan a stir; the arguments and errors of `record`."""
+    from ..hardware import HiddenLiquid
+
     check_consent(ask, emulate, "record")
-    opened, hidden = rig_of(rig), hidden_liquid(emulate)
+    opened = rig_of(rig)
     plan, task = _planned(opened, cycles, given_path(out, Argument("out")))
-    by = ask if hidden is None else with_stir(opened, plan, hidden)
+    hidden = HiddenLiquid() if emulate is True else emulate
+    by = with_stir(opened, plan, hidden) if hidden else ask
     assert by is not None
     return PlannedStir(plan, task, by)
 

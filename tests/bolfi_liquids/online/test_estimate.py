@@ -84,25 +84,6 @@ def aligned(strokes, seed=1234):
     return align(PLAN, ENDS, data(strokes, seed))
 
 
-def width(found):
-    spread = found.parameters["viscosity"]
-    return np.log(spread.q95 / spread.q05)
-
-
-def test_more_strokes_say_more():
-    of = problem()
-    known = made(of)
-    first, last = (
-        [estimate(of, known, aligned(k, seed), NoMap(), 0.0) for seed in range(6)]
-        for k in (1, len(ENDS))
-    )
-    assert np.mean([width(one) for one in last]) < 0.8 * np.mean([width(one) for one in first])
-    assert [one.strokes for one in last] == [len(ENDS)] * 6
-    # 90 % intervals: that two or more of six miss has a chance of 0.11, three or more 0.016
-    inside = [one.parameters["viscosity"] for one in last]
-    assert sum(spread.q05 < 0.5 < spread.q95 for spread in inside) >= 4
-
-
 def test_missing_samples_equal_a_shorter_recording():
     """What is NaN after a stroke teaches what a recording up to there would have taught."""
     of = problem()

@@ -5,7 +5,8 @@ import os
 import signal
 import sqlite3
 import time
-from contextlib import ExitStack
+from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import ExitStack, nullcontext
 from dataclasses import asdict, replace
 from functools import partial
 from multiprocessing import active_children
@@ -18,7 +19,7 @@ import bolfi_liquids as bl
 from bolfi_liquids import models
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.online import online
-from bolfi_liquids.online.estimate import Problem
+from bolfi_liquids.online.estimate import Answer, Problem
 from bolfi_liquids.online.online import OnlineCalibration, OnlineChoice, OnlinePhase
 from bolfi_liquids.online.plan import PartialRecording
 from bolfi_liquids.online.settings import OnlineSettings
@@ -177,6 +178,56 @@ def test_what_goes_wrong_is_told_and_disturbs_nobody(story):
     assert "learns has died" in story.dead.detail and story.after is None
     running = {child.pid for child in active_children()}
     assert not running & {story.learner.pid, story.simulator.pid}
+
+
+class Inline(Executor):
+    """Does what is submitted at once, until it is dead."""
+
+    dead = False
+
+    def submit(self, task, /, *given):
+        if self.dead:
+            raise BrokenExecutor
+        done = Future()
+        done.set_result(task(*given))
+        return done
+
+
+def test_what_becomes_of_data_simulations_and_dead_processes(
+    short_recording, tmp_path, monkeypatch
+):
+    """The order of its tasks, without processes."""
+    plan = bl.open_recording(short_recording)
+    problem = Problem(default_prior(), stir_simulator([plan], SMALL.particles), SMALL)
+    learner, simulator = Inline(), Inline()
+    executors, asked = iter([learner, simulator]), []
+    estimate = SimpleNamespace(as_record=lambda: {"strokes": 1})
+    aligned = SimpleNamespace(strokes=1, observed="seen")
+    answers = iter([Answer(refusal="off its plan"), Answer(aligned, estimate), Answer()])
+    monkeypatch.setattr(online, "background_process", lambda _: nullcontext(next(executors)))
+    monkeypatch.setattr(online, "design", lambda _: ("design",))
+    monkeypatch.setattr(online, "answer", lambda *given: asked.append(given[2:]) or next(answers))
+    monkeypatch.setattr(online, "proposals", lambda _, made, observed, n: ("proposed",))
+    with OnlineCalibration(problem, tmp_path, lambda: "map", lambda jobs: jobs, ExitStack()) as of:
+        assert of.phase is OnlinePhase.PREPARING
+        assert of.wait_until_ready(10.0) and of.made == ("design",)
+        assert of.update("first") is None  # ordered
+        assert of.poll() is None
+        assert (of.phase, of.detail) == (OnlinePhase.REFUSED, "off its plan")
+        of.update("second")
+        assert of.update("third") is estimate and of.phase is OnlinePhase.READY
+        assert asked == [("map", 0, "first"), ("map", 0, "second"), ("map", 1, "third")]
+        assert json.loads((tmp_path / online.LOG).read_text()) == {"strokes": 1}
+        for _ in range(3):
+            of.poll()
+        assert of.made == ("design", "proposed")
+        simulator.dead = True
+        for _ in range(3):
+            of.poll()
+        assert of.phase is OnlinePhase.READY and "simulates has died" in of.detail
+        learner.dead = True
+        assert of.update("fourth") is None
+        assert of.phase is OnlinePhase.FAILED and "learns has died" in of.detail
 
 
 def test_a_run_is_free_again_where_nothing_could_begin(short_recording, tmp_path, monkeypatch):
