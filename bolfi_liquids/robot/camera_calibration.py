@@ -1,13 +1,14 @@
 """Calibration of one of a rig's cameras: its lens by a printed board, its roll by a plumb line."""
 
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import Argument
+from ..files import new_file
 from ..inputs.rigs import rig_of
 
 if TYPE_CHECKING:
@@ -27,12 +28,20 @@ def write_board(path: Path) -> Path:
     from ..hardware.vision import CharucoBoard
     from ..hardware.vision.opencv import opencv
 
-    if path.exists():
-        raise InputError("exists already", where=str(path), fix="name a file that does not")
-    can_be = path.suffix.lower() == ".png" and path.parent.is_dir()
-    if not (can_be and opencv().imwrite(str(path), CharucoBoard().print_image())):
-        raise InputError("cannot be written", where=str(path), fix="name a .png that can be")
+    path = new_file(path, Argument("print_board"), suffix=".png", replace=False)
+    opencv().imwrite(str(path), CharucoBoard().print_image())
     return path
+
+
+@contextmanager
+def _refused(*kinds: type[Exception], where: str, fix: str) -> Iterator[None]:
+    """Turn these errors of hardware into a `RigError` that names what to mend."""
+    from ..hardware import RigError
+
+    try:
+        yield
+    except kinds as err:
+        raise RigError(str(err), where=where, fix=fix) from err
 
 
 def calibrate_view(
@@ -57,7 +66,6 @@ def calibrate_view(
     Raises:
         RigError: The rig, the camera or the pictures cannot be used.
     """
-    from ..hardware import RigError
     from ..hardware.recorder.views import camera_model, orientation
     from ..hardware.vision import (
         CalibrationError,
@@ -74,7 +82,8 @@ def calibrate_view(
     else:
         on_board = [] if boards is None else _read(boards)
         thread = None if plumb_line is None else _read(plumb_line)[0]
-    try:
+    errors, again = (CalibrationError, PlumbLineError), "take the pictures again"
+    with _refused(*errors, where=f"camera {view}", fix=again):
         if on_board:
             lens = calibrate_intrinsics(on_board, board)
             beside = Path() if rig is None else Path(rig).parent
@@ -83,8 +92,6 @@ def calibrate_view(
         else:
             model = camera_model(camera)
         yield _roll(camera, model, thread)
-    except (CalibrationError, PlumbLineError) as err:
-        raise RigError(str(err), where=f"camera {view}", fix="take the pictures again") from err
 
 
 def _read(path: Path) -> list[np.ndarray]:
@@ -93,13 +100,10 @@ def _read(path: Path) -> list[np.ndarray]:
     Raises:
         RigError: It cannot be used.
     """
-    from ..hardware import RigError
     from ..hardware.cameras import CameraError, FilesCamera
 
-    try:
+    with _refused(CameraError, where=str(path), fix="give a directory of pictures"):
         return [frame.image for frame in iter(FilesCamera(path).read, None)]
-    except CameraError as err:
-        raise RigError(str(err), where=str(path), fix="give a directory of pictures") from err
 
 
 def _taken(camera: "Camera") -> tuple[list[np.ndarray], np.ndarray]:
@@ -108,7 +112,6 @@ def _taken(camera: "Camera") -> tuple[list[np.ndarray], np.ndarray]:
     Raises:
         RigError: The camera cannot be used.
     """
-    from ..hardware import RigError
     from ..hardware.cameras import CameraError
     from ..hardware.session.cameras import open_camera
 
@@ -116,20 +119,20 @@ def _taken(camera: "Camera") -> tuple[list[np.ndarray], np.ndarray]:
     hang = "plumb line: hang a thread in front of an even background, then press Enter "
     numbers = range(1, BOARD_PICTURES + 1)
     asked = [f"board, picture {n} of {BOARD_PICTURES}: {how}" for n in numbers]
-    try:
-        with closing(open_camera(camera)) as source:
+    where = f"camera {camera.view}: source = {camera.source!r}"
+    with (
+        _refused(CameraError, where=where, fix="correct rig.toml"),
+        closing(open_camera(camera)) as source,
+    ):
 
-            def after(question: str) -> np.ndarray:
-                input(question)
-                source.read()  # what the driver has kept from before
-                if (frame := source.read()) is None:
-                    raise CameraError("the camera gives no more pictures")
-                return frame.image
+        def after(question: str) -> np.ndarray:
+            input(question)
+            source.read()  # what the driver has kept from before
+            if (frame := source.read()) is None:
+                raise CameraError("the camera gives no more pictures")
+            return frame.image
 
-            return [after(question) for question in asked], after(hang)
-    except CameraError as err:
-        where = f"camera {camera.view}: source = {camera.source!r}"
-        raise RigError(str(err), where=where, fix="correct rig.toml") from err
+        return [after(question) for question in asked], after(hang)
 
 
 def _written(lens: "Intrinsics", path: Path) -> Iterator[str]:
