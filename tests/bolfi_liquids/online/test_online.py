@@ -198,19 +198,20 @@ def test_what_becomes_of_data_simulations_and_dead_processes(
 ):
     """The order of its tasks, without processes."""
     plan = bl.open_recording(short_recording)
-    problem = Problem(default_prior(), stir_simulator([plan], SMALL.particles), SMALL)
+    few, made = replace(SMALL, budget=9), tuple(range(8))
+    problem = Problem(default_prior(), stir_simulator([plan], SMALL.particles), few)
     learner, simulator = Inline(), Inline()
     executors, asked = iter([learner, simulator]), []
     estimate = SimpleNamespace(as_record=lambda: {"strokes": 1})
     aligned = SimpleNamespace(strokes=1, observed="seen")
     answers = iter([Answer(refusal="off its plan"), Answer(aligned, estimate), Answer()])
     monkeypatch.setattr(online, "background_process", lambda _: nullcontext(next(executors)))
-    monkeypatch.setattr(online, "design", lambda _: ("design",))
+    monkeypatch.setattr(online, "design", lambda _: made)
     monkeypatch.setattr(online, "answer", lambda *given: asked.append(given[2:]) or next(answers))
     monkeypatch.setattr(online, "proposals", lambda _, made, observed, n: ("proposed",))
     with OnlineCalibration(problem, tmp_path, lambda: "map", lambda jobs: jobs, ExitStack()) as of:
         assert of.phase is OnlinePhase.PREPARING
-        assert of.wait_until_ready(10.0) and of.made == ("design",)
+        assert of.wait_until_ready(10.0) and of.made == made
         assert of.update("first") is None  # ordered
         assert of.poll() is None
         assert (of.phase, of.detail) == (OnlinePhase.REFUSED, "off its plan")
@@ -218,10 +219,10 @@ def test_what_becomes_of_data_simulations_and_dead_processes(
         assert of.update("third") is estimate and of.phase is OnlinePhase.READY
         assert asked == [("map", 0, "first"), ("map", 0, "second"), ("map", 1, "third")]
         assert json.loads((tmp_path / online.LOG).read_text()) == {"strokes": 1}
-        for _ in range(3):
+        for _ in range(5):
             of.poll()
-        assert of.made == ("design", "proposed")
-        simulator.dead = True
+        assert of.made == (*made, "proposed")  # and no more than the budget
+        of.settings, simulator.dead = SMALL, True
         for _ in range(3):
             of.poll()
         assert of.phase is OnlinePhase.READY and "simulates has died" in of.detail
