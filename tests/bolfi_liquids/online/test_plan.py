@@ -117,11 +117,11 @@ def test_what_the_cameras_missed_is_missing():
 
 def test_another_stir_is_refused_and_tracking_errors_are_not():
     rows = (
-        (data(ENDS[2] + 0.1, off=1.2 * MAX_OFF_PLAN), "mm off its plan"),
-        (data(ENDS[2] + 0.1, off=0.7 * MAX_OFF_PLAN), ""),
-        (data(ENDS[2] + 0.1, delay=1.2 * MAX_DELAY_CHANGE), "lost 240 ms"),
-        (data(ENDS[2] + 0.1, delay=-1.2 * MAX_DELAY_CHANGE), "gained 240 ms"),
-        (data(ENDS[2] + 0.1, delay=0.8 * MAX_DELAY_CHANGE), ""),
+        (data(ENDS[2] + 0.1, off=2.4e-3), "mm off its plan"),
+        (data(ENDS[2] + 0.1, off=1.6e-3), ""),
+        (data(ENDS[2] + 0.1, delay=0.24), "lost 240 ms"),
+        (data(ENDS[2] + 0.1, delay=-0.24), "gained 240 ms"),
+        (data(ENDS[2] + 0.1, delay=0.16), ""),
         (data(2.0)._replace(position=np.full((250, 3), np.nan)), "positions"),
     )
     for seen, why in rows:
