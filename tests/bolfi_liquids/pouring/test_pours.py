@@ -42,9 +42,9 @@ def test_pours_cover_the_posterior_and_every_angular_velocity():
 
 
 def test_a_posterior_that_hardly_moved_asks_for_nothing_new():
-    box = box_of(posterior(0.4))
-    before = named(box, 64)
-    assert named(box, 40) < before == named(box_of(posterior(0.4, sd=0.152)), 64)
+    box, moved = box_of(posterior(0.4)), box_of(posterior(0.4, sd=0.152))
+    assert np.array_equal(box.low, moved.low) and np.array_equal(box.high, moved.high)
+    assert named(box, 40) < named(box, 64) == named(moved, 64)
 
 
 def test_a_posterior_beside_the_first_asks_for_what_that_lacks():
