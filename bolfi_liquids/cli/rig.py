@@ -1,7 +1,7 @@
 """The command group `rig`: the robot and the cameras, before anything is recorded."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -55,13 +55,15 @@ def calibrate_cameras(  # noqa: PLR0913  an option each
         Path | None,
         typer.Option(metavar="PICTURE", help="Of a thread that hangs; without it, it is taken."),
     ] = None,
-    square: Annotated[float, typer.Option(help="Side of a printed square, in cm.")] = 2.5,
+    square: Annotated[
+        float, typer.Option(min=0.2, max=20.0, help="Side of a printed square, in cm.")
+    ] = 2.5,
     out: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Of the lens; without it, camera_VIEW.json."),
     ] = None,
     rig: RigOption = None,
-    view: Annotated[str, typer.Option(metavar="xz|yz", help="Which camera.")] = "xz",
+    view: Annotated[Literal["xz", "yz"], typer.Option(help="Which camera.")] = "xz",
     print_board: Annotated[
         Path | None, typer.Option(metavar="PNG", help="Only write the board, to be printed.")
     ] = None,

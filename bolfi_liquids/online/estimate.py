@@ -6,8 +6,7 @@ Delta(t) = int_0^t (y - y~)^2 dt.
 """
 
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.stirs import rms, sensor_noise
-from ..calibration.summary import BAD_FIT_RATIO, MIN_NOISE_DEG, unexplained
-from ..errors import InputError
+from ..calibration.summary import BAD_FIT_RATIO, MIN_NOISE_DEG, ParameterSummary, unexplained
 from ..inputs.frame import frame_faults
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from ..models import stirring_error
@@ -33,22 +31,13 @@ if TYPE_CHECKING:
 DRAWS_EACH = 500  # of each of two chains
 
 
-class Spread(NamedTuple):
-    """Of a parameter's posterior, in its own unit."""
-
-    mean: float
-    q05: float
-    q50: float
-    q95: float
-
-
 class OnlineEstimate(NamedTuple):
     """What is known after a stroke.
 
     Attributes:
         strokes: Finished.
         covered: Time of the plan up to which data were used [s].
-        parameters: Name -> posterior.
+        parameters: Name -> posterior, in the parameter's own unit.
         action: Best pour, `angular_velocity` [rad/s] and `distance` [m].
         expected_spillage: Mean spilled fraction of that pour over the posterior.
         spillage_q95: Spilled fraction that one such pour in twenty exceeds.
@@ -64,7 +53,7 @@ class OnlineEstimate(NamedTuple):
 
     strokes: int
     covered: float
-    parameters: dict[str, Spread]
+    parameters: dict[str, ParameterSummary]
     action: dict[str, float]
     expected_spillage: float
     spillage_q95: float
@@ -78,7 +67,7 @@ class OnlineEstimate(NamedTuple):
 
     def as_record(self) -> dict[str, Any]:
         """As `online.jsonl` has it."""
-        parameters = {name: spread._asdict() for name, spread in self.parameters.items()}
+        parameters = {name: asdict(spread) for name, spread in self.parameters.items()}
         return self._asdict() | {"parameters": parameters}
 
     @property
@@ -132,8 +121,7 @@ class Answer(NamedTuple):
 
 def design(problem: Problem) -> "list[Job]":
     """The simulations to make before the robot moves: all over the prior."""
-    engine = _engine(problem, (), np.zeros(problem.shape), problem.settings.seed)
-    return _jobs(problem, engine.ask(problem.settings.design), 0)
+    return proposals(problem, (), np.zeros(problem.shape), problem.settings.design)
 
 
 def simulate_plan(stirring: StirSimulator, bank: Path, batch: int, jobs: "list[Job]") -> Made:
@@ -159,13 +147,17 @@ def proposals(problem: Problem, made: Made, observed: NDArray, n: int) -> "list[
 
     Args:
         problem: What stays the same.
-        made: Simulations so far.
+        made: Simulations so far; without any, the points lie all over the prior.
         observed: Of `align`.
         n: How many.
     """
-    # the rule's own jitter must differ from one call to the next
-    (seed,) = simulation_seeds(problem.settings.seed, Phase.ONLINE_SEARCH, 1, len(made))
-    return _jobs(problem, _engine(problem, made, observed, seed).ask(n), len(made))
+    from ..inference.simulations import jobs
+
+    seed = search_seed = problem.settings.seed
+    if made:  # the rule's own jitter must differ from one call to the next
+        (search_seed,) = simulation_seeds(seed, Phase.ONLINE_SEARCH, 1, len(made))
+    theta = _engine(problem, made, observed, search_seed).ask(n)
+    return jobs(theta, simulation_seeds(seed, Phase.ONLINE_STIRS, len(made) + n)[len(made) :])
 
 
 def answer(
@@ -181,11 +173,8 @@ def answer(
         so_far: The data.
     """
     (plan,) = problem.stirring.recordings
-    try:
-        aligned = align(plan, stroke_ends(plan), so_far)
-    except InputError as error:  # later data may be used
-        return Answer(refusal=str(error))
-    if aligned.refusal:
+    aligned = align(plan, stroke_ends(plan), so_far)
+    if aligned.refusal:  # later data may be used
         return Answer(refusal=aligned.refusal)
     if aligned.strokes <= known or not np.isfinite(aligned.observed).any():
         return Answer()
@@ -218,7 +207,7 @@ def estimate(
     fit = engine.fit(warn=False)  # warnings are among the estimate's complaints
     seed, (plan,) = problem.settings.seed, problem.stirring.recordings
     tree = fit.sample("quadrature", chains=2, draws=DRAWS_EACH, seed=seed, warn=False)
-    posterior = tree["posterior"]
+    posterior = tree["posterior"].to_dataset()
     status = str(posterior.attrs["status"])
     draws = {name: posterior[name].to_numpy().ravel() for name in problem.prior.names}
     pour = landing_map.best(draws)
@@ -227,7 +216,7 @@ def estimate(
     return OnlineEstimate(
         strokes=aligned.strokes,
         covered=aligned.covered,
-        parameters={name: _spread(values) for name, values in draws.items()},
+        parameters={name: ParameterSummary.of(posterior[name]) for name in draws},
         action=pour.action,
         expected_spillage=pour.expected_spillage,
         spillage_q95=pour.spillage_q95,
@@ -283,16 +272,3 @@ def _engine(problem: Problem, made: Made, observed: NDArray, seed: int) -> "Bolf
         theta, seeds = columns([job for job, _ in made])
         engine.tell(theta, stacked([result for _, result in made], problem.shape), seeds)
     return engine
-
-
-def _jobs(problem: Problem, theta: Mapping[str, NDArray], first: int) -> "list[Job]":
-    from ..inference.simulations import jobs
-
-    count = len(theta[problem.prior.names[0]])
-    seeds = simulation_seeds(problem.settings.seed, Phase.ONLINE_STIRS, first + count)[first:]
-    return jobs(theta, seeds)
-
-
-def _spread(values: NDArray) -> Spread:
-    q05, q50, q95 = (float(q) for q in np.quantile(values, [0.05, 0.5, 0.95]))
-    return Spread(float(values.mean()), q05, q50, q95)

@@ -2,21 +2,20 @@
 
 The path of the gripper is known before the robot moves. So the plan is simulated before and while
 it is carried out, every simulation once and to its end, and after each stroke all of them are
-compared with the data so far. One process simulates, another learns, and a thread gives them their
-tasks; no call here blocks the process that supervises the robot: `update` and `poll` return at
-once, and what goes wrong is a status.
+compared with the data so far. One process simulates, another learns; `poll` takes what they have
+finished and orders what is next. No call here blocks the process that supervises the robot:
+`update` and `poll` return at once, and what goes wrong is a status.
 """
 
 import json
 import os
-from collections import deque
+import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import BrokenExecutor, Future
 from contextlib import ExitStack
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from threading import Event, Thread
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..calibration.calibrate import calibrate
@@ -26,14 +25,23 @@ from ..inputs.cups import bundled_cups
 from ..inputs.open import Source
 from ..inputs.prior import default_prior
 from ..inputs.recording import planned_recording
-from ..pouring.design import joint_prior, whole
-from ..pouring.landed_pours import Parcels, pours_in
 from ..pouring.landing_map import LandingMap, learn_map
+from ..pouring.parcels import Parcels
+from ..pouring.pours import joint_prior, pours_in, whole
 from ..progress import progress_bar
 from ..run.compute import background_process
 from ..run.run import RUN_TOML, alone_in
 from ..simulators import PourSimulator, stir_simulator
-from .estimate import Made, OnlineEstimate, Problem, answer, design, proposals, simulate_plan
+from .estimate import (
+    Answer,
+    Made,
+    OnlineEstimate,
+    Problem,
+    answer,
+    design,
+    proposals,
+    simulate_plan,
+)
 from .plan import Aligned, PartialRecording, stroke_ends
 from .settings import OnlineSettings
 
@@ -44,7 +52,7 @@ if TYPE_CHECKING:
 
 BANK, LOG = "online.sqlite", "online.jsonl"
 USUAL_CYCLES = 5  # of the pattern at the most, by default
-POLL_SECONDS = 0.02  # s between looks for data and simulations
+POLL_SECONDS = 0.02  # s between looks, while it is prepared
 LEARNER_NICENESS = 5  # control and cameras come first
 SIMULATOR_NICENESS = 10  # an estimate matters more than another simulation
 
@@ -83,22 +91,6 @@ class OnlinePhase(StrEnum):
     FAILED = "failed"
 
 
-class Status(NamedTuple):
-    """How an online calibration is doing.
-
-    Attributes:
-        phase: What it is doing.
-        detail: What is being prepared, or what is wrong; "" if nothing is.
-        simulations: Finished, failed ones included.
-        in_flight: Being simulated.
-    """
-
-    phase: OnlinePhase
-    detail: str
-    simulations: int = 0
-    in_flight: int = 0
-
-
 class OnlineCalibration:
     """An online calibration under way; made by `start`, closed by `close` or a `with`.
 
@@ -107,8 +99,10 @@ class OnlineCalibration:
         plan: The planned stir.
         ends: When each of its strokes ends [s].
         out: The RUN directory that `finish` makes.
+        phase: What it was doing at the last `poll`.
+        detail: What is being prepared, or what is wrong; "" if nothing is.
+        made: Finished simulations, failed ones included.
         estimates: All so far.
-        status: How it is doing.
     """
 
     def __init__(
@@ -131,22 +125,22 @@ class OnlineCalibration:
         self.settings, self.out = problem.settings, out
         (self.plan,) = problem.stirring.recordings
         self.ends = stroke_ends(self.plan)
+        self.made: Made = ()
         self.estimates: list[OnlineEstimate] = []
-        self.status = Status(OnlinePhase.PREPARING, "starting")
+        self.phase = OnlinePhase.PREPARING
+        self.detail = "learning the map of landings, and simulating the plan"
         self._problem, self._learn_pours, self._simulate_plan = problem, learn_pours, simulate
-        self._told = 0  # estimates that `poll` has returned
-        self._unread: deque[PartialRecording] = deque(maxlen=1)
-        self._prepared, self._closing = Event(), Event()
-        self._made: Made = ()
+        self._map: LandingMap | None = None
+        self._unread: PartialRecording | None = None
+        self._aligned: Aligned | None = None  # the data that were learned from last
+        self._learning: tuple[Future, Callable[[Any], None]] | None = None  # task, and what follows
         self._simulating: Future[Made] | None = None
         self._no_more = ""  # why nothing is simulated any more
-        thread = Thread(target=self._work, name="online calibration", daemon=True)
         with ExitStack() as processes:
             self._learner = processes.enter_context(background_process(LEARNER_NICENESS))
             self._simulator = processes.enter_context(background_process(SIMULATOR_NICENESS))
-            thread.start()
-            resources.callback(thread.join)
-            resources.push(processes.pop_all())  # closed first: the thread waits for them
+            self._learn(self._designed, design, problem)
+            resources.push(processes.pop_all())
         self._resources = resources.pop_all()
 
     @classmethod
@@ -203,32 +197,53 @@ class OnlineCalibration:
             simulate = partial(simulate_plan, problem.stirring, bank, batch)
             return cls(problem, out, learn, simulate, resources)
 
-    def wait_until_ready(self, timeout: float | None = None) -> bool:
+    def wait_until_ready(self, timeout: float = float("inf")) -> bool:
         """Wait until data may come, or preparation failed, or `timeout` [s] has passed.
 
         Returns:
-            Whether it is ready; if not, `status` says why.
+            Whether it is ready; if not, `detail` says why.
         """
-        self._prepared.wait(timeout)
-        return self.status.phase == OnlinePhase.READY
+        until = time.monotonic() + timeout
+        while self.phase is OnlinePhase.PREPARING and time.monotonic() < until:
+            time.sleep(POLL_SECONDS)
+            self.poll()
+        return self.phase is OnlinePhase.READY
 
     def update(self, so_far: PartialRecording) -> OnlineEstimate | None:
         """Hand over the recording so far, at best after each stroke; returns at once.
 
         What was not looked at yet is replaced. Data of an arm that is off its plan by more than
         `plan.MAX_OFF_PLAN`, or whose delay changed by more than `plan.MAX_DELAY_CHANGE` in a
-        stroke, are not learned from: `status` says so.
+        stroke, are not learned from: `phase` and `detail` say so.
 
         Returns:
             As `poll`.
         """
-        self._unread.append(so_far)
+        self._unread = so_far
         return self.poll()
 
     def poll(self) -> OnlineEstimate | None:
-        """The newest estimate, if one came since the last call; returns at once."""
-        before, self._told = self._told, len(self.estimates)
-        return self.estimates[self._told - 1] if self._told > before else None
+        """Take what the processes have finished, and order what is next; returns at once.
+
+        Returns:
+            The estimate that was finished, if one was.
+        """
+        if self.phase is OnlinePhase.FAILED:
+            return None
+        before = len(self.estimates)
+        try:
+            self._take_simulations()
+            if self._learning is not None and self._learning[0].done():
+                (finished, then), self._learning = self._learning, None
+                then(finished.result())
+            if self._learning is None:
+                self._go_on()
+        except BrokenExecutor:
+            self.phase = OnlinePhase.FAILED
+            self.detail = "the process that learns has died; the recording goes on"
+        except Exception as error:
+            self.phase, self.detail = OnlinePhase.FAILED, f"{type(error).__name__}: {error}"
+        return self.estimates[-1] if len(self.estimates) > before else None
 
     def finish(self, recording: Source, *, budget: int = 20, progress: bool = True) -> Path:
         """Calibrate on the finished recording by the ordinary `calibrate`, into `out`.
@@ -257,7 +272,6 @@ class OnlineCalibration:
 
     def close(self) -> None:
         """End the other processes; what they have simulated is kept. Closing twice does no harm."""
-        self._closing.set()
         self._resources.close()
 
     def __enter__(self) -> "OnlineCalibration":
@@ -266,67 +280,43 @@ class OnlineCalibration:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _work(self) -> None:
-        """Prepare; then answer data as they come, and simulate in between, until it is closed."""
-        try:
-            self._prepare()
-            aligned = None
-            while self.status.phase is not OnlinePhase.FAILED and not self._is_closing():
-                self._take_simulations()
-                if self._unread:
-                    aligned = self._answer(self._unread.popleft(), aligned)
-                elif aligned is not None:
-                    self._go_on(aligned)
-        except BrokenExecutor:
-            self._fail("the process that learns has died; the recording goes on")
-        except Exception as error:
-            self._fail(f"{type(error).__name__}: {error}")
-        finally:
-            self._prepared.set()
+    def _learn(self, then: Callable[[Any], None], task: Callable[..., Any], *given: Any) -> None:
+        """Order a task of the process that learns; `then` takes what it returns."""
+        self._learning = self._learner.submit(task, *given), then
 
-    def _is_closing(self) -> bool:
-        """Wait `POLL_SECONDS`; whether it was closed meanwhile."""
-        return self._closing.wait(POLL_SECONDS)
+    def _go_on(self) -> None:
+        """Order what the process that learns is to do next, if there is something."""
+        if self.phase is OnlinePhase.PREPARING:
+            if self._simulating is None:  # the design is there
+                self.phase, self.detail = OnlinePhase.READY, ""
+        elif self._unread is not None:
+            so_far, self._unread = self._unread, None
+            known = 0 if self._aligned is None else self._aligned.strokes
+            state = self._problem, self.made, self._map, known, so_far
+            self._learn(self._answered, answer, *state)
+        elif self._aligned is not None and self._simulating is None and not self._no_more:
+            n = min(self.settings.in_flight, self.settings.budget - len(self.made))
+            if n > 0:
+                state = self._problem, self.made, self._aligned.observed, n
+                self._learn(self._simulate, proposals, *state)
 
-    def _prepare(self) -> None:
+    def _designed(self, jobs: "list[Job]") -> None:
         """Learn the map of landings while the design is simulated."""
-        self._simulate(self._learn(design, self._problem))
-        self._tell(detail="learning the map of landings, and simulating the plan")
-        learned = self._learner.submit(self._learn_pours)
-        while not (self._no_more or self._is_closing()):
-            self._take_simulations()
-            if learned.done():
-                self._map = learned.result()
-                if self._simulating is None:
-                    break
-        if self._no_more:
-            self._fail(self._no_more)
-        else:
-            self._tell(phase=OnlinePhase.READY, detail="")
-        self._prepared.set()
+        self._simulate(jobs)
+        self._learn(self._mapped, self._learn_pours)
 
-    def _answer(self, so_far: PartialRecording, before: Aligned | None) -> Aligned | None:
-        """Estimate from data, or refuse them; the data that were learned from last."""
-        known = 0 if before is None else before.strokes
-        found = self._learn(answer, self._problem, self._made, self._map, known, so_far)
+    def _mapped(self, landing_map: LandingMap) -> None:
+        self._map = landing_map
+
+    def _answered(self, found: Answer) -> None:
+        """Keep an estimate, or say why data cannot be used."""
         if found.estimate is not None:
             self.estimates.append(found.estimate)
             with (self.out / LOG).open("a", encoding="utf-8") as log:
                 log.write(json.dumps(found.estimate.as_record()) + "\n")
-        phase = OnlinePhase.REFUSED if found.refusal else OnlinePhase.READY
-        self._tell(phase=phase, detail=found.refusal or self._no_more)
-        return found.aligned or before
-
-    def _go_on(self, aligned: Aligned) -> None:
-        """Simulate the points that the data suggest, unless others are being simulated."""
-        n = min(self.settings.in_flight, self.settings.budget - len(self._made))
-        if n > 0 and self._simulating is None and not self._no_more:
-            state = self._problem, self._made, aligned.observed, n
-            self._simulate(self._learn(proposals, *state))
-
-    def _learn(self, task: Callable[..., Any], *given: Any) -> Any:
-        """What a task of the process that learns returns."""
-        return self._learner.submit(task, *given).result()
+        self.phase = OnlinePhase.REFUSED if found.refusal else OnlinePhase.READY
+        self.detail = found.refusal or self._no_more
+        self._aligned = found.aligned or self._aligned
 
     def _simulate(self, jobs: "list[Job]") -> None:
         try:
@@ -334,25 +324,19 @@ class OnlineCalibration:
         except BrokenExecutor as error:
             self._simulating = Future()
             self._simulating.set_exception(error)
-        self._tell(in_flight=len(jobs))
 
     def _take_simulations(self) -> None:
         if self._simulating is None or not self._simulating.done():
             return
         future, self._simulating = self._simulating, None
         try:
-            self._made += future.result()
+            self.made += future.result()
         except BrokenExecutor:  # the others are enough for estimates
             self._no_more = "the process that simulates has died"
         except Exception as error:
             self._no_more = f"the plan cannot be simulated: {type(error).__name__}: {error}"
-        detail = self.status.detail or self._no_more
-        self._tell(detail=detail, simulations=len(self._made), in_flight=0)
-
-    def _fail(self, why: str) -> None:
-        self._tell(phase=OnlinePhase.FAILED, detail=why, in_flight=0)
-
-    def _tell(self, **changes: Any) -> None:
-        """Change the status, unless it is being closed: that its processes end is no failure."""
-        if not self._closing.is_set():
-            self.status = self.status._replace(**changes)
+        if not self._no_more:
+            return
+        if self.phase is OnlinePhase.PREPARING:
+            self.phase, self.detail = OnlinePhase.FAILED, self._no_more
+        self.detail = self.detail or self._no_more

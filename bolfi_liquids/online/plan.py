@@ -5,14 +5,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
 from ..inputs.recording import Recording
 from ..inputs.strokes import strokes
 
 MAX_OFF_PLAN = 2e-3  # m that the arm may be off its plan; star strokes are 50 mm long
-MAX_DELAY_CHANGE = (
-    0.2  # s that a stroke may change the delay by; a servoed arm follows by some 0.1 s
-)
+MAX_DELAY_CHANGE = 0.2  # s by which a stroke may change the delay; a servoed arm lags some 0.1 s
 SEARCHED, STEP = 0.4, 0.02  # s, up to which such a change is looked for, and how finely at first
 MAX_GAP = 2.5  # sampling intervals of the plan; data farther apart are not interpolated between
 MOVED_DISTANCE = 5e-3  # m from which the delay shows
@@ -75,12 +72,8 @@ def align(plan: Recording, ends: NDArray, so_far: PartialRecording) -> Aligned:
     Args:
         plan: Of `planned`.
         ends: Of `stroke_ends`.
-        so_far: Of which at least two positions were seen.
-
-    Raises:
-        InputError: The arrays are no recording.
+        so_far: The data.
     """
-    _check(so_far)
     delays, apart = _delays(plan, ends, so_far)
     done = len(delays) - 1
     covered = float(ends[done - 1]) if done else float("-inf")
@@ -88,25 +81,13 @@ def align(plan: Recording, ends: NDArray, so_far: PartialRecording) -> Aligned:
     wanted = plan.time + delays[stroke]
     observed = np.column_stack([_sampled(wanted, so_far.time, y) for y in so_far.inclination.T])
     observed[plan.time > covered + END_SLACK] = np.nan
-    change = np.diff(delays, prepend=0.0)
-    refusal = _refusal(float(change[np.abs(change).argmax()]), apart)
     delay = float(delays[max(done - 1, 0)])
-    return Aligned(observed, done, covered, delay, apart, refusal)
-
-
-def _check(so_far: PartialRecording) -> None:
-    size = len(so_far.time)
-    shapes = (so_far.time.shape, so_far.position.shape, so_far.inclination.shape)
-    if size < 2 or shapes != ((size,), (size, 3), (size, 2)):
-        raise InputError(
-            f"arrays of shapes {shapes}",
-            where="data so far",
-            fix="give (S,) times, (S, 3) positions and (S, 2) inclinations of at least two samples",
-        )
-    if not (np.diff(so_far.time) > 0).all():
-        raise InputError("times do not rise", where="data so far", fix="sort the samples")
     if np.isfinite(so_far.position).all(axis=1).sum() < 2:
-        raise InputError("fewer than two positions", where="data so far", fix="wait for the arm")
+        refusal = "fewer than two of the arm's positions are known"
+    else:
+        change = np.diff(delays, prepend=0.0)
+        refusal = _refusal(float(change[np.abs(change).argmax()]), apart)
+    return Aligned(observed, done, covered, delay, apart, refusal)
 
 
 def _delays(

@@ -1,34 +1,34 @@
 """Recording and calibrating at the same time: the arm stirs until the pour is known well enough."""
 
+import logging
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..inputs.recording import Recording
-from ..robot.armed_session import Ask
-from ..robot.live_view import SessionView
-from ..robot.record import finished, prepare_stir, stir_session
-from ..robot.stir import StirPlan, follow_plan
+from ..robot.armed_session import Ask, SessionView
+from ..robot.record import carried_out, prepare_stir
+from ..robot.stir import StirPlan
 from ..wording import at_most, spilled
 from .online import OnlineCalibration, OnlineChoice, OnlinePhase
 from .plan import PartialRecording
 
 if TYPE_CHECKING:
-    from ..hardware import HiddenLiquid, Rig, Session
+    from ..hardware import HiddenLiquid, Rig
     from ..hardware.motion import PosePath, Trajectory
     from .estimate import OnlineEstimate
+
+logger = logging.getLogger(__name__)
 
 BAD_FIT = (
     "the fit is bad; the gripper's and the camera's frames may differ: do not rely on this "
     "estimate; stirring does not end by it"
 )
 PLAN_RATE = 30.0  # Hz, of the simulated plan; the cameras'
-FOLLOWED_AFTER = (
-    0.2  # s, after which arm, cameras and files have followed a stroke's last set-point
-)
+FOLLOWED_AFTER = 0.2  # s, until arm, cameras and files have followed a stroke's last set-point
 
 
 def record_online(
@@ -70,46 +70,55 @@ def record_online(
     path, attrs = _simulated(stir.plan), rig_attributes(stir.task.rig)
     with OnlineCalibration.start(path, attrs, online, progress=progress) as calibration:
         if not calibration.wait_until_ready():
-            raise RuntimeError(f"the calibration is not ready: {calibration.status.detail}")
-        with stir_session(stir, "stirring and calibrating", progress) as (session, view):
-            follow_plan(session, stir.plan, _Learning(session, calibration, view).wait)
-        recording = finished(stir.task.out)
+            raise RuntimeError(f"the calibration is not ready: {calibration.detail}")
+        learning, doing = Learning(calibration), "stirring and calibrating"
+        recording = carried_out(stir, learning.wait, doing, progress=progress)
         calibration.finish(recording, progress=progress)
     return recording
 
 
 @dataclass
-class _Learning:
-    """What is learned while the arm stirs."""
+class Learning:
+    """What is learned while the arm stirs.
 
-    session: "Session"
+    Attributes:
+        calibration: Learns.
+        enough: Whether the pour is known well enough.
+        warned: Of what a person was warned.
+    """
+
     calibration: OnlineCalibration
-    view: SessionView
     enough: bool = False
+    warned: set[str] = field(default_factory=set)
 
-    def wait(self, number: int, path: "PosePath") -> bool:
+    def wait(self, view: SessionView, number: int, path: "PosePath") -> bool:
         """Wait for a path's end, and hand over the data so far after a stroke; whether the pour is
         known well enough."""
-        while not self.session.wait(number, timeout=0.05):
-            self._take(self.calibration.poll())
+        while not view.session.wait(number, timeout=0.05):
+            self._take(self.calibration.poll(), view)
         if path.stirring:
             time.sleep(FOLLOWED_AFTER)
-            if (so_far := _so_far(self.session.directory, time.monotonic())) is not None:
-                self._take(self.calibration.update(so_far))
+            if (so_far := _so_far(view.session.directory, time.monotonic())) is not None:
+                self._take(self.calibration.update(so_far), view)
         return self.enough
 
-    def _take(self, estimate: "OnlineEstimate | None") -> None:
-        status = self.calibration.status
-        if status.detail and status.phase is not OnlinePhase.PREPARING:
-            self.view.warn(f"calibration {status.phase}: {status.detail}")
+    def _take(self, estimate: "OnlineEstimate | None", view: SessionView) -> None:
+        phase, detail = self.calibration.phase, self.calibration.detail
+        if detail and phase is not OnlinePhase.PREPARING:
+            self._warn(f"calibration {phase}: {detail}")
         if estimate is not None:
             self.enough = estimate.is_enough(self.calibration.settings)
             if not estimate.fits:
-                self.view.warn(BAD_FIT)
-                for fault in estimate.frame_faults:
-                    self.view.warn(fault)
-            self.view.say(sentence(estimate))
-        self.view.show(self.session)
+                for notice in (BAD_FIT, *estimate.frame_faults):
+                    self._warn(notice)
+            view.say(sentence(estimate))
+        view.show()
+
+    def _warn(self, notice: str) -> None:
+        """Log a line, once."""
+        if notice not in self.warned:
+            self.warned.add(notice)
+            logger.warning(notice)
 
 
 def sentence(estimate: "OnlineEstimate") -> str:

@@ -4,7 +4,7 @@ import json
 import logging
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,26 +15,26 @@ from ..criticism.result import Criticism, calibration_to_pour
 from ..errors import Argument, InputError
 from ..inputs.cups import cups_of
 from ..inputs.pour_table import Pours, PourTable, check_scene, table_of
-from ..inputs.prior import PARAMETERS
 from ..inputs.settings import PourSettings, Risk
 from ..progress import progress_bar
 from ..run.compute import open_compute
 from ..run.given_pours import GIVEN_POURS, digest_of_pours, keep_pours, kept_pours
 from ..run.run import Run, RunOrPath
 from ..simulators import PourSimulator
-from .design import acting_in_pours, box_around, joint_prior
-from .draining import LIQUIDS, TENTH, Draining, hold_of
-from .landed_pours import Parcels, pours_in
 from .landing_map import LandingMap, learn_map
-from .pour_file import pour_tree
-from .result import Pour, PourSummary
-from .spillage import landing_sd
+from .parcels import Parcels
+from .pours import LIQUIDS, TENTH, Draining, box_around, hold_of, joint_prior, pours_in
+from .result import ActionSummary, GivenSummary, Pour, PourSummary, pour_tree
+from .spillage import Judged, Surface, landing_sd
 
 if TYPE_CHECKING:
     from ..inference.simulations import Compute, Workers
     from ..models import Cups
 
 logger = logging.getLogger(__name__)
+
+Draws = dict[str, NDArray[np.float64]]
+"""Posterior draws of liquids, name -> (draws,)."""
 
 JUDGE_DRAWS_FACTOR = 2
 """How many times as many draws judge the two actions as search for them."""
@@ -64,7 +64,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     where the liquid lands (see `landing_map`). On the map every action is tried over posterior
     draws; the one whose risk is least is chosen, averaged over where the liquid may land, and
     judged on draws that it was not chosen by. How far the map is from pours that were left out
-    counts in both. Pours that were made of the liquid correct the map in both (see `residual`).
+    counts in both. Pours that were made of the liquid correct the map in both (see `given`).
     Finished pours are kept in the run, and another posterior of it uses them again.
 
     Args:
@@ -94,7 +94,15 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     if table is not None:
         check_scene(table, cups)
     with Run.entered(calibration) as run:
-        latest = _posterior_of(calibration, run)
+        latest, own = calibration_to_pour(run), calibration
+        if isinstance(own, Criticism):
+            own = own.calibration
+        if isinstance(own, Calibration) and own.key != latest.key:
+            raise InputError(
+                "holds another posterior: a criticism has added to it, or draws were changed",
+                where=str(run.path),
+                fix="give the RUN directory",
+            )
         if not force:
             refuse_bad_fit(latest.summary, run.path)
         counted = _counted(run.path, cups, table)
@@ -111,25 +119,6 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         }
         run.keep("pour", pour.tree, made_from, pour.summary.to_json())
         return pour
-
-
-def _posterior_of(given: RunOrPath, run: Run) -> Calibration:
-    """The latest posterior of a run, as it was given or as the run holds it.
-
-    Raises:
-        InputError: What was given is not the latest: its pour would be out of date at once.
-    """
-    if isinstance(given, Criticism):
-        given = given.calibration
-    if not isinstance(given, Calibration):
-        return calibration_to_pour(run)
-    if given.key != run.posterior_key():
-        raise InputError(
-            "holds another posterior: a criticism has added to it, or draws were changed",
-            where=str(run.path),
-            fix="give the RUN directory",
-        )
-    return given
 
 
 def _counted(run: Path, cups: "Cups", given: PourTable | None) -> PourTable | None:
@@ -175,44 +164,47 @@ def decided(
         InputError, RuntimeError: See `choose_pour`.
     """
     search, judge = strata(calibration, settings.draws, settings.seed)
-    known: dict[str, Any] = {"rates": settings.iterations, "seed": settings.seed}
+    seed, density = settings.seed, calibration.liquid_density
     with calibration.run.bank() as bank:
         own = replace(compute, bank=bank)
         simulated = learned = _learned(calibration, cups, settings, own, progress)
         if given is not None:
-            learned = simulated.corrected(given, search, seed=settings.seed)
+            learned = simulated.corrected(given, search, seed=seed)
         at_best = {name: np.array([value]) for name, value in calibration.best.items()}
+
+        def surface(on: LandingMap, liquids: Draws) -> Surface:
+            return on.surface(liquids, rates=settings.iterations, seed=seed)
+
+        def least(tried: Surface) -> Judged:
+            return learned.judge(tried.least(settings.risk), judge, seed=seed)
+
         tried = {
-            "actions": learned.surface(search, **known),
-            "actions_plug_in": learned.surface(at_best, **known),
+            "actions": surface(learned, search),
+            "actions_plug_in": surface(learned, at_best),
         }
-        chosen, plug_in = (
-            learned.judge(surface.least(settings.risk), judge, seed=settings.seed)
-            for surface in tried.values()
-        )
+        chosen, plug_in = (least(one) for one in tried.values())
         hold = None
         if chosen.fractions[:, 2].mean() > TENTH:
-            density, effects = calibration.liquid_density, learned.box.effects
-            draining = PourSimulator(cups, density, Draining(), effects)
+            draining = PourSimulator(cups, density, Draining(), learned.box.effects)
             with progress_bar("holding the source", LIQUIDS, shown=progress) as advance:
                 hold = hold_of(draining, chosen.angular_velocity, search, own, advance)
     corrected = None
     if learned.given is not None:
-        otherwise = simulated.surface(search, **known).least(settings.risk)
-        without = learned.judge(otherwise, judge, seed=settings.seed)
-        corrected = learned.given.summary(chosen, without)
-    summary = PourSummary.from_judged(
+        without = least(surface(simulated, search))
+        corrected = GivenSummary.of(learned.given, chosen, without)
+    summary = PourSummary.of(
         chosen,
-        plug_in,
-        settings,
+        plug_in=ActionSummary.of(plug_in),
+        risk=settings.risk,
+        seed=seed,
         n_simulations=learned.pours,
         map_error=learned.rms_error,
-        least_viscosity=cups.least_viscosity(calibration.liquid_density),
+        least_viscosity=cups.least_viscosity(density),
         fit_status=calibration.summary.fit_status,  # a bad fit was poured by force
         given=corrected,
         hold=hold,
     )
-    tree = pour_tree(chosen, plug_in, tried, search, learned, settings.risk)
+    tree = pour_tree({"chosen": chosen, "plug_in": plug_in}, tried, search, learned, settings.risk)
     tree.attrs.update(
         asdict(settings),
         cups=json.dumps(cups.settings()),
@@ -233,16 +225,11 @@ def _learned(
 ) -> LandingMap:
     """The map of landings around a posterior; what the run's bank holds is not poured again."""
     draws = {str(name): v.to_numpy().ravel() for name, v in calibration.posterior.items()}
-    effects = acting_in_pours([name for name in draws if name not in PARAMETERS])
-    box = box_around(joint_prior(calibration.prior, effects, cups), draws, calibration.best)
-    pours = PourSimulator(cups, calibration.liquid_density, Parcels(), effects)
+    box = box_around(joint_prior(calibration.prior, draws, cups), draws, calibration.best)
+    pours = PourSimulator(cups, calibration.liquid_density, Parcels(), box.effects)
     with progress_bar("pouring", settings.budget, shown=progress) as advance:
         poured = pours_in(box, pours, settings.budget, compute, advance)
     return learn_map(box, cups, poured)
-
-
-Draws = dict[str, NDArray[np.float64]]
-"""Posterior draws of liquids, name -> (draws,)."""
 
 
 def strata(calibration: Calibration, draws: int, seed: int) -> tuple[Draws, Draws]:

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.contour import QuadContourSet
     from matplotlib.figure import Figure
-    from matplotlib.patches import Patch
-    from xarray import Dataset, DataTree
+    from xarray import DataTree
 
     from ..drawing import Canvas
 
@@ -58,6 +57,8 @@ def pour_figure(tree: "DataTree") -> "Figure":
     Args:
         tree: pour.nc.
     """
+    from matplotlib.patches import Patch
+
     actions = tree["actions"].to_dataset()
     spilled = actions["spilled"].to_numpy()
     x, y = action_axes(tree)
@@ -66,10 +67,16 @@ def pour_figure(tree: "DataTree") -> "Figure":
     expected, bad = upper.subplots(1, 2, sharey=True)
     shades = draw_expected(expected, tree)
     handles, labels = expected.get_legend_handles_labels()
-    chosen = place_of(actions, tree["chosen"].attrs)
-    alike = not_surely_worse(spilled, tree.attrs["risk"], chosen)
+    row, column = (
+        int(np.argmin(np.abs(actions[name].to_numpy() - tree["chosen"].attrs[name])))
+        for name in ACTION
+    )
+    alike = not_surely_worse(spilled, tree.attrs["risk"], (row, column))
     if alike.any():
-        handles.append(dot_actions(expected, x, y, alike))
+        expected.contourf(
+            x, y, alike.T.astype(float), levels=(0.5, 1.5), colors="none", hatches=["...."]
+        )
+        handles.append(Patch(facecolor="none", edgecolor=INK, hatch="....", lw=0.0))
         labels.append("not surely worse than the chosen")
     draw_map(bad, x, y, 100.0 * np.quantile(spilled, BAD_CASE, axis=0))
     mark_choices(bad, tree)
@@ -87,15 +94,8 @@ def action_axes(tree: "DataTree") -> tuple[NDArray, NDArray]:
     Args:
         tree: pour.nc.
     """
-    actions = tree["actions"].to_dataset()
-    return np.degrees(actions["angular_velocity"].to_numpy()), 100.0 * actions[
-        "distance"
-    ].to_numpy()
-
-
-def risk_label(tree: "DataTree") -> str:
-    """The name of what was minimised."""
-    return "expected" if tree.attrs["risk"] == "mean" else "CVaR"
+    rates, distances = (tree["actions"][name].to_numpy() for name in ACTION)
+    return np.degrees(rates), 100.0 * distances
 
 
 def draw_expected(axes: "Axes", tree: "DataTree") -> "QuadContourSet":
@@ -103,7 +103,8 @@ def draw_expected(axes: "Axes", tree: "DataTree") -> "QuadContourSet":
     x, y = action_axes(tree)
     shades = draw_map(axes, x, y, 100.0 * tree["actions"]["risk"].to_numpy())
     mark_choices(axes, tree)
-    axes.set_title(f"spilled [%], {risk_label(tree)}", loc="left")
+    risk = "expected" if tree.attrs["risk"] == "mean" else "CVaR"
+    axes.set_title(f"spilled [%], {risk}", loc="left")
     axes.set_xlabel("angular velocity [deg/s]")
     axes.set_ylabel("distance from lip to receiver's axis [cm]")
     return shades
@@ -120,23 +121,6 @@ def draw_map(axes: "Axes", x: NDArray, y: NDArray, percent: NDArray) -> "QuadCon
     lines = axes.contour(x, y, percent.T, levels=PERCENT_LEVELS[1:4], colors=INK, linewidths=0.6)
     axes.clabel(lines, fmt="%g %%", fontsize=7.5)
     return shades
-
-
-def dot_actions(axes: "Axes", x: NDArray, y: NDArray, where: NDArray) -> "Patch":
-    """Dots over actions, bool (W, D); what stands for them in a legend."""
-    from matplotlib.patches import Patch
-
-    levels = (0.5, 1.5)
-    axes.contourf(x, y, where.T.astype(float), levels=levels, colors="none", hatches=["...."])
-    return Patch(facecolor="none", edgecolor=INK, hatch="....", lw=0.0)
-
-
-def place_of(actions: "Dataset", chosen: dict) -> tuple[int, int]:
-    """Row and column of an action."""
-    row, column = (
-        int(np.argmin(np.abs(actions[name].to_numpy() - chosen[name]))) for name in ACTION
-    )
-    return row, column
 
 
 def not_surely_worse(

@@ -1,23 +1,137 @@
-"""Pours that were made of the liquid, between a map of pours and the decision."""
+"""Pours that were made of the liquid: a Gaussian process of what a map of landings misses of them.
 
+A share s is an angle arcsin √s here: so a pour that is repeated varies alike whatever it spills,
+and no correction leads below nothing or beyond all. What becomes of the liquid is the angle that
+one of many outcomes of the map predicts, plus a process of the action that is the same for all
+outcomes; a given pour is that plus its own repeatability. Given pours move each outcome by
+Matheron's rule (Wilson et al., Pathwise conditioning of Gaussian processes, JMLR 2021): by what
+separates this very outcome from them, as far as the process or the spread of the outcomes connects
+them with the action.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..criticism.pours import (
     CORRELATION_LENGTH,
+    REPEATABILITY_SD,
     SIMULATOR_ERROR_SD,
     action_coordinates,
 )
 from ..inputs.pour_table import PourTable
 from ..seeds import Phase, generator
-from .residual import Residual, angle, expected_share, learn_residual, share
-from .result import CONTRADICTION, ActionSummary, GivenPour, GivenSummary, Judged
-from .spillage import Surface, normal_scores
+from .spillage import Judged, Surface, normal_scores
 
-SHOWN_GIVEN = 3
-"""Given pours that are shown beside the choice: those most like it."""
+LOG_PRIOR_SD = 1.0, 0.5, 0.5
+"""Of the logs of the process's standard deviation and of its two lengths."""
+NODES = 7  # at which an expectation over the process is computed
+
+
+def angle(share: NDArray) -> NDArray[np.float64]:
+    """Of shares."""
+    return np.arcsin(np.sqrt(np.clip(share, 0.0, 1.0)))
+
+
+def share(angle: NDArray) -> NDArray[np.float64]:
+    """Of angles, those beyond nothing or all taken there."""
+    return np.sin(np.clip(angle, 0.0, np.pi / 2.0)) ** 2
+
+
+def expected_share(mean: NDArray, sd: NDArray) -> NDArray[np.float64]:
+    """Mean share of angles that are normally distributed, mean (n, m) and sd (m,)."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
+    parts = (w * share(mean + at * sd) for at, w in zip(nodes, weights, strict=True))
+    return sum(parts, start=np.zeros_like(mean)) / weights.sum()
+
+
+class Residual(NamedTuple):
+    """Of one share that was observed in A given pours; see `learn_residual`.
+
+    Attributes:
+        at: `action_coordinates` of the given pours, shape (A, 2).
+        observed: Angles of their shares, shape (A,).
+        sd: Of the process.
+        lengths: Of its correlation along both coordinates, shape (2,).
+    """
+
+    at: NDArray[np.float64]
+    observed: NDArray[np.float64]
+    sd: float
+    lengths: NDArray[np.float64]
+
+    def moved(
+        self, here: NDArray, there: NDArray, at: NDArray
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """What n outcomes predict of m actions, as the given pours say.
+
+        Args:
+            here: Angles that the outcomes predict of the given pours, shape (n, A).
+            there: Angles that they predict of the actions, shape (n, m).
+            at: `action_coordinates` of the actions, shape (m, 2).
+
+        Returns:
+            Mean angles, shape (n, m), none beyond nothing or all; the sd of a pour about each,
+            shape (m,).
+        """
+        cross = self.covariance(at, self.at)
+        process = self.given_covariance
+        weights = np.linalg.solve(process + _spread(here, here), (cross + _spread(there, here)).T).T
+        left = self.sd**2 - 2.0 * np.sum(weights * cross, axis=1)
+        left += np.sum((weights @ process) * weights, axis=1) + REPEATABILITY_SD**2
+        # what lies below nothing for a smooth process is not known to be nothing
+        mean = np.clip(there + (self.observed - here) @ weights.T, 0.0, np.pi / 2.0)
+        return mean, np.sqrt(left)
+
+    @property
+    def given_covariance(self) -> NDArray[np.float64]:
+        """Of the given pours about an outcome, shape (A, A)."""
+        return self.covariance(self.at, self.at) + REPEATABILITY_SD**2 * np.eye(len(self.at))
+
+    def covariance(self, a: NDArray, b: NDArray) -> NDArray[np.float64]:
+        """Of the process between coordinates (n, 2) and (m, 2), shape (n, m)."""
+        apart = np.sum(((a[:, None] - b) / self.lengths) ** 2, axis=-1)
+        return self.sd**2 * np.exp(-0.5 * apart)
+
+    def log_density(self, here: NDArray) -> float:
+        """Of the given pours, where outcomes predict angles `here` of them, (n, A); less a
+        constant."""
+        whole = self.given_covariance + _spread(here, here)
+        left = self.observed - here.mean(axis=0)
+        return -0.5 * float(left @ np.linalg.solve(whole, left) + np.linalg.slogdet(whole)[1])
+
+
+def _spread(a: NDArray, b: NDArray) -> NDArray[np.float64]:
+    """Covariance (m, k) between outcomes a (n, m) and b (n, k)."""
+    return (a - a.mean(axis=0)).T @ (b - b.mean(axis=0)) / len(a)
+
+
+def learn_residual(
+    at: NDArray, observed: NDArray, here: NDArray, sd: float, lengths: Sequence[float]
+) -> Residual:
+    """The process that most probably separates outcomes from given pours.
+
+    Args:
+        at: `action_coordinates` of the given pours, shape (A, 2).
+        observed: Angles of their shares, shape (A,).
+        here: Angles that n outcomes predict of them, shape (n, A).
+        sd, lengths: Medians of the process's prior.
+    """
+    from scipy.optimize import minimize
+
+    middle, width = np.log([sd, *lengths]), np.array(LOG_PRIOR_SD)
+
+    def residual(z: NDArray) -> Residual:
+        first, *others = np.exp(middle + width * z)
+        return Residual(at, observed, float(first), np.array(others))
+
+    def loss(z: NDArray) -> float:
+        return 0.5 * float(z @ z) - residual(z).log_density(here)
+
+    return residual(minimize(loss, np.zeros(len(middle)), method="L-BFGS-B").x)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,10 +156,8 @@ class GivenPours:
             there: What the map says of them.
             here: What it says of the given pours, for the same draws, shape (draws, A).
         """
-        at = action_coordinates(
-            np.repeat(there.angular_velocity, len(there.distance)),
-            np.tile(there.distance, len(there.angular_velocity)),
-        )
+        rates, distances = np.meshgrid(there.angular_velocity, there.distance, indexing="ij")
+        at = action_coordinates(rates.ravel(), distances.ravel())
         flat = there.spilled.reshape(len(there.spilled), -1)
         moved = self.spilled.moved(angle(here), angle(flat), at)
         return there._replace(spilled=expected_share(*moved).reshape(there.spilled.shape))
@@ -61,11 +173,13 @@ class GivenPours:
         """
         rng, at = generator(seed, Phase.GIVEN_POURS), _coordinates_of(there)
         scores = normal_scores(len(there.fractions))
-        fractions = []
-        for k, (residual, column) in enumerate(((self.spilled, 0), (self.retained, 2))):
-            mean, sd = residual.moved(angle(here[..., k]), angle(there.fractions[:, [column]]), at)
-            fractions.append(share(mean[:, 0] + sd * rng.permutation(scores)))
-        spilled, retained = fractions
+
+        def moved(residual: Residual, here: NDArray, there: NDArray) -> NDArray[np.float64]:
+            mean, sd = residual.moved(angle(here), angle(there[:, None]), at)
+            return share(mean[:, 0] + sd * rng.permutation(scores))
+
+        spilled = moved(self.spilled, here[..., 0], there.fractions[:, 0])
+        retained = moved(self.retained, here[..., 1], there.fractions[:, 2])
         received = np.maximum(1.0 - spilled - retained, 0.0)
         whole = np.column_stack([spilled, received, retained])
         return replace(there, fractions=whole / whole.sum(axis=1, keepdims=True))
@@ -75,50 +189,25 @@ class GivenPours:
         apart = np.sum((self.spilled.at - _coordinates_of(chosen)) ** 2, axis=1)
         return np.argsort(apart, kind="stable")
 
-    def summary(self, chosen: Judged, without: Judged) -> GivenSummary:
-        """Numbers of the given pours, of the chosen action, and of that without given pours."""
-        table = self.table
-        numbers = zip(
-            table.lines.tolist(),
-            np.degrees(table.angular_velocity).tolist(),
-            (100.0 * table.distance).tolist(),
-            *table.observed.tolist(),
-            *self.expected.T.tolist(),
-            strict=True,
-        )
-        pours = [GivenPour(*row) for row in numbers]
-        worst = max(pours, key=lambda pour: pour.contradiction)
-        return GivenSummary(
-            file=table.path.name,
-            sha256=table.hash,
-            liquid=table.liquid,
-            lines=tuple(pour.line for pour in pours),
-            nearest=tuple(pours[k] for k in self.nearest(chosen)[:SHOWN_GIVEN]),
-            contradicting=worst if worst.contradiction >= CONTRADICTION else None,
-            without=ActionSummary.of(without),
-        )
-
 
 def _coordinates_of(judged: Judged) -> NDArray[np.float64]:
     """Shape (1, 2)."""
     return action_coordinates(np.array([judged.angular_velocity]), np.array([judged.distance]))
 
 
-def learn_given(table: PourTable, spilled: NDArray, retained: NDArray) -> GivenPours:
+def learn_given(table: PourTable, here: tuple[NDArray, NDArray]) -> GivenPours:
     """Learn what a map misses of given pours.
 
     Args:
         table: The pours that count, A of them.
-        spilled, retained: Fractions that the map predicts of each, for draws of the liquid, shape
-            (draws, A).
+        here: Spilled and retained fractions that the map predicts of each, for draws of the liquid,
+            shape (draws, A).
     """
     at = action_coordinates(table.angular_velocity, table.distance)
-    kinds = zip(
-        table.observed, (spilled, retained), SIMULATOR_ERROR_SD, CORRELATION_LENGTH, strict=True
-    )
+    kinds = zip(table.observed, here, SIMULATOR_ERROR_SD, CORRELATION_LENGTH, strict=True)
     learned = [
-        learn_residual(at, angle(seen), angle(here), sd, (length, length))
-        for seen, here, sd, length in kinds
+        learn_residual(at, angle(seen), angle(predicted), sd, (length, length))
+        for seen, predicted, sd, length in kinds
     ]
-    expected = np.column_stack([spilled.mean(axis=0), retained.mean(axis=0)])
+    expected = np.column_stack([predicted.mean(axis=0) for predicted in here])
     return GivenPours(table, expected, *learned)

@@ -18,13 +18,12 @@ from ..inputs.pour_table import PourTable
 from ..inputs.settings import MIN_MAP_POURS
 from ..seeds import Phase, generator
 from ..simulators import RATE
-from .design import Box
 from .given import GivenPours, learn_given
-from .landed_pours import Poured
 from .parcels import fractions_of, scale
-from .result import Judged
+from .pours import Box, Poured
 from .spillage import (
     MAX_LANDING_SDS,
+    Judged,
     Profiles,
     Surface,
     landed,
@@ -77,9 +76,11 @@ class LandingMap:
             liquids: Parameters and coefficients, name -> (draws,); others are ignored.
             misses: Which left-out pour each draw is as far from its prediction as, shape (draws,).
         """
-        rows = self._predicted(rates, liquids) + np.tile(
-            self.emulation.missed[misses], (len(rates), 1)
-        )
+        names = [name for name in self.box.prior.names if name != RATE]
+        theta = {name: np.tile(liquids[name], len(rates)) for name in names}
+        theta[RATE] = np.repeat(rates, len(misses))
+        predicted = self.emulation.predict(_inputs(self.box, theta))
+        rows = predicted + np.tile(self.emulation.missed[misses], (len(rates), 1))
         distance = reachable_distances(self.cups)
         fractions = fractions_of(rows, distance, self.cups.receiver.radius)
         return Profiles(rates, distance, fractions.reshape(len(rates), len(misses), -1, 3))
@@ -169,7 +170,7 @@ class LandingMap:
         spilled = self._spilled(table, outcomes, misses)
         landed = self._landed(table.angular_velocity, table.distance, outcomes, misses)
         retained = landed[:, ::LANDINGS_PER_DRAW, 2].T  # the same wherever the liquid lands
-        return replace(self, given=learn_given(table, spilled, retained))
+        return replace(self, given=learn_given(table, (spilled, retained)))
 
     def _outcomes(
         self, liquids: Mapping[str, NDArray], seed: int
@@ -205,13 +206,6 @@ class LandingMap:
         return np.stack(
             [landed(profiles.fractions[k], profiles.distance, at, off) for k, at in pairs]
         )
-
-    def _predicted(self, rates: NDArray, liquids: Mapping[str, NDArray]) -> NDArray[np.float64]:
-        """Rows (W * draws, ROW), the rates first."""
-        names = [name for name in self.box.prior.names if name != RATE]
-        draws = len(liquids[names[0]])
-        theta = {name: np.tile(liquids[name], len(rates)) for name in names}
-        return self.emulation.predict(_inputs(self.box, {**theta, RATE: np.repeat(rates, draws)}))
 
 
 def learn_map(box: Box, cups: "Cups", poured: Poured) -> LandingMap:

@@ -6,10 +6,14 @@ where they land: a row is the root of the share that stays in the source, the pl
 parcels [m] from the lip, and their distances from the plane of the pour [m].
 """
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..simulators import BatchOf
 
 if TYPE_CHECKING:
     from ..models import Landings
@@ -35,6 +39,23 @@ def scale() -> NDArray[np.float64]:
     ahead = PLACE_SCALE * error / error.min()
     across = np.full(PARCELS, PLACE_SCALE)
     return np.concatenate([[RETAINED_SCALE / np.sqrt(PARCELS)], ahead, across])
+
+
+@dataclass(frozen=True)
+class Parcels:
+    """Where the liquid lands, as rows (B, ROW) of `parcels_of`."""
+
+    def __call__(
+        self, batch: BatchOf, theta: Mapping[str, NDArray], seeds: NDArray
+    ) -> NDArray[np.float64]:
+        from .. import models
+
+        return parcels_of(models.landings(*batch(theta, seeds)))
+
+    @property
+    def settings(self) -> list[Any]:
+        """The number of parcels."""
+        return ["landed pours", PARCELS]
 
 
 def parcels_of(landings: "Landings") -> NDArray[np.float64]:

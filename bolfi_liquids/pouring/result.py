@@ -1,29 +1,36 @@
-"""A chosen pour: the action, what it spills, and where it lies among the actions."""
+"""A chosen pour: pour.nc, and its section of summary.json.
+
+The groups of pour.nc are `actions` and `actions_plug_in`, over a grid of actions, the spillage
+expected for each draw of the posterior, or at theta*, and the risk that was minimised; `chosen` and
+`plug_in`, over outcomes, fractions with draws that did not choose; `liquids`, the posterior draws
+that the choice was made with; `pours`, those that the map was learned from, and how far it missed
+each; `given`, pours that were given and correct the map, and what it expects of them alone.
+"""
 
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.summary import FitStatus
-from ..inputs.settings import PourSettings
+from ..run.given_pours import UNITS
 from ..run.results import Number, Section
 from ..run.run import Run, RunOrPath
-from ..wording import html_table, spilled
-from .draining import Hold
-from .spillage import ACTION, FRACTIONS
+from ..wording import html_table
+from .given import GivenPours
+from .pours import Hold
+from .spillage import ACTION, FRACTIONS, Judged, Surface
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from xarray import DataTree
+    from xarray import Dataset, DataTree
 
-SPILLAGE_QUANTILE = 0.95
-"""Of the spilled fraction: one outcome in twenty exceeds it."""
+    from .landing_map import LandingMap
 
 INTERVAL = 0.05, 0.95
 """Quantiles of the fractions that arrive and stay."""
@@ -32,47 +39,8 @@ CONTRADICTION = 0.05
 """Difference between the fractions that a given pour has spilled and that the map expects of it,
 from which on a person is warned."""
 
-
-@dataclass(frozen=True, eq=False)
-class Judged:
-    """An action and what it spills, on draws that did not choose it.
-
-    Attributes:
-        angular_velocity: Of the source about its lip [rad/s].
-        distance: Horizontally from the lip to the receiver's axis [m].
-        fractions: Spilled, received and retained, shape (outcomes, 3); rows sum to 1. Each draw
-            has several outcomes, as the liquid may land elsewhere than simulated.
-    """
-
-    angular_velocity: float
-    distance: float
-    fractions: NDArray[np.float64]
-
-    @property
-    def action(self) -> dict[str, float]:
-        """`angular_velocity` and `distance`."""
-        return dict(zip(ACTION, (self.angular_velocity, self.distance), strict=True))
-
-    @property
-    def expected_spillage(self) -> float:
-        """Mean spilled fraction."""
-        return float(self.fractions[:, 0].mean())
-
-    @property
-    def spillage_q95(self) -> float:
-        """Spilled fraction that one outcome in twenty exceeds."""
-        return float(np.quantile(self.fractions[:, 0], SPILLAGE_QUANTILE))
-
-    def equals(self, other: "Judged") -> bool:
-        """Whether another one has the same action and the same outcomes."""
-        same = self.action == other.action
-        return same and np.array_equal(self.fractions, other.fractions)
-
-    def __str__(self) -> str:
-        return (
-            f"{np.degrees(self.angular_velocity):.1f} deg/s, {100 * self.distance:.2f} cm, "
-            f"expected to spill {spilled(self.expected_spillage)}"
-        )
+SHOWN_GIVEN = 3
+"""Given pours that are shown beside the choice: those most like it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,7 +51,7 @@ class Pour:
         run: Whose pour it is.
         chosen: Found over the posterior draws.
         plug_in: Found at theta* alone, judged over the same draws as `chosen`.
-        tree: pour.nc; its groups are listed in `pouring.pour_file`.
+        tree: pour.nc.
         summary: The section "pour" of summary.json.
     """
 
@@ -120,7 +88,8 @@ class Pour:
     def made(cls, run: Run, tree: "DataTree") -> "Pour":
         """The pour of a run from its pour.nc."""
         summary = PourSummary.from_json(json.loads(tree.attrs["summary"]))
-        return cls(run, judged(tree, "chosen"), judged(tree, "plug_in"), tree, summary)
+        chosen, plug_in = (_judged(tree[name].to_dataset()) for name in ("chosen", "plug_in"))
+        return cls(run, chosen, plug_in, tree, summary)
 
     @property
     def path(self) -> Path:
@@ -141,15 +110,20 @@ class Pour:
 
         return shown(partial(map_plot, self.tree), ax)[0, 0]
 
-    def check_current(self, run: Run) -> None:
-        """Raise `ValueError` if another pour was chosen in its run since."""
-        there = run.required("pour")
-        pairs = ((self.chosen, "chosen"), (self.plug_in, "plug_in"))
-        if not all(one.equals(judged(there, name)) for one, name in pairs):
+    def check_current(self, now: "Pour") -> None:
+        """Raise `ValueError` if its run holds another pour now."""
+        if not (self.chosen.equals(now.chosen) and self.plug_in.equals(now.plug_in)):
             raise ValueError(
                 f"another pour was chosen in {self.path} since; open it by Pour.open, or choose "
                 "this one again"
             )
+
+
+def _judged(outcomes: "Dataset") -> Judged:
+    """The action in one of the groups `chosen` and `plug_in`."""
+    columns = [outcomes[fraction].to_numpy() for fraction in FRACTIONS]
+    action = {name: float(outcomes.attrs[name]) for name in ACTION}
+    return Judged(**action, fractions=np.column_stack(columns))
 
 
 @dataclass(frozen=True)
@@ -180,13 +154,15 @@ class ActionSummary:
     @classmethod
     def of(cls, judged: Judged, **more) -> Self:
         """From what was judged; `more` are the fields of a subclass."""
+        for name, fraction in zip(FRACTIONS[1:], judged.fractions.T[1:], strict=True):
+            low, high = map(float, np.quantile(fraction, INTERVAL))
+            mean = float(fraction.mean())
+            more |= {f"expected_{name}": mean, f"{name}_q05": low, f"{name}_q95": high}
         return cls(
             angular_velocity_deg_s=float(np.degrees(judged.angular_velocity)),
             distance_cm=100.0 * judged.distance,
             expected_spillage=judged.expected_spillage,
             spillage_q95=judged.spillage_q95,
-            **_spread("received", judged.fractions[:, 1]),
-            **_spread("retained", judged.fractions[:, 2]),
             **more,
         )
 
@@ -194,13 +170,6 @@ class ActionSummary:
     def action(self) -> tuple[float, float]:
         """Angular velocity [deg/s] and distance [cm]."""
         return self.angular_velocity_deg_s, self.distance_cm
-
-
-def _spread(name: str, fractions: NDArray) -> dict[str, float]:
-    """Mean and `INTERVAL` of fractions, by the names of `ActionSummary`."""
-    low, high = np.quantile(fractions, INTERVAL)
-    mean = float(fractions.mean())
-    return {f"expected_{name}": mean, f"{name}_q05": float(low), f"{name}_q95": float(high)}
 
 
 @dataclass(frozen=True)
@@ -250,6 +219,30 @@ class GivenSummary:
     contradicting: GivenPour | None
     without: ActionSummary
 
+    @classmethod
+    def of(cls, given: GivenPours, chosen: Judged, without: Judged) -> Self:
+        """From the given pours and the two actions."""
+        table = given.table
+        rows = zip(
+            table.lines.tolist(),
+            np.degrees(table.angular_velocity).tolist(),
+            (100.0 * table.distance).tolist(),
+            *table.observed.tolist(),
+            *given.expected.T.tolist(),
+            strict=True,
+        )
+        pours = [GivenPour(*row) for row in rows]
+        worst = max(pours, key=lambda pour: pour.contradiction)
+        return cls(
+            file=table.path.name,
+            sha256=table.hash,
+            liquid=table.liquid,
+            lines=tuple(pour.line for pour in pours),
+            nearest=tuple(pours[k] for k in given.nearest(chosen)[:SHOWN_GIVEN]),
+            contradicting=worst if worst.contradiction >= CONTRADICTION else None,
+            without=ActionSummary.of(without),
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class PourSummary(ActionSummary, Section):
@@ -279,23 +272,65 @@ class PourSummary(ActionSummary, Section):
     given: GivenSummary | None = None
     hold: Hold | None = None
 
-    @classmethod
-    def from_judged(
-        cls, chosen: Judged, plug_in: Judged, settings: PourSettings, **more: Any
-    ) -> Self:
-        """From two actions, the settings of the choice, and the fields that neither has."""
-        return cls.of(
-            chosen,
-            risk=settings.risk,
-            seed=settings.seed,
-            plug_in=ActionSummary.of(plug_in),
-            **more,
-        )
+
+def pour_tree(
+    judged: Mapping[str, Judged],
+    tried: Mapping[str, Surface],
+    liquids: Mapping[str, NDArray],
+    learned: "LandingMap",
+    risk: str,
+) -> "DataTree":
+    """Everything that a report shows of a pour.
+
+    Args:
+        judged: The two actions, by the name of the group.
+        tried: What actions may be expected to spill, likewise.
+        liquids: The posterior draws of the choice, name -> (draws,).
+        learned: The map that it was made with.
+        risk: Which measure of `spillage.RISK` was minimised.
+    """
+    from xarray import Dataset, DataTree
+
+    missed = np.sqrt(np.mean(learned.error**2, axis=1))
+    pours = {**learned.poured.theta, "missed": missed}
+    groups = {
+        **{name: _actions(surface, risk) for name, surface in tried.items()},
+        **{name: _outcomes(one) for name, one in judged.items()},
+        "liquids": Dataset({name: ("draw", values) for name, values in liquids.items()}),
+        "pours": Dataset({name: ("pour", values) for name, values in pours.items()}),
+    }
+    if learned.given is not None:
+        groups["given"] = _given(learned.given)
+    return DataTree.from_dict({f"/{name}": dataset for name, dataset in groups.items()})
 
 
-def judged(tree: "DataTree", name: str) -> Judged:
-    """The action in one of the groups `chosen` and `plug_in`."""
-    outcomes = tree[name].to_dataset()
-    columns = [outcomes[fraction].to_numpy() for fraction in FRACTIONS]
-    action: Mapping = {at: float(outcomes.attrs[at]) for at in ACTION}
-    return Judged(**action, fractions=np.column_stack(columns))
+def _given(given: GivenPours) -> "Dataset":
+    from xarray import Dataset
+
+    table = given.table
+    names = (*ACTION, *FRACTIONS, "expected_spilled", "expected_retained")
+    values = (table.angular_velocity, table.distance, *table.fractions.T, *given.expected.T)
+    columns = {
+        name: ("line", of, {"units": UNITS.get(name, "1")})
+        for name, of in zip(names, values, strict=True)
+    }
+    attributes = {"file": table.path.name, "liquid": table.liquid, "sha256": table.hash}
+    return Dataset(columns, {"line": table.lines}, attributes)
+
+
+def _actions(surface: Surface, risk: str) -> "Dataset":
+    from xarray import Dataset
+
+    columns = {
+        "spilled": (("draw", *ACTION), surface.spilled.astype(np.float32)),
+        "risk": (ACTION, surface.risk(risk)),
+    }
+    axes = {name: (name, getattr(surface, name), {"units": UNITS[name]}) for name in ACTION}
+    return Dataset(columns, axes)
+
+
+def _outcomes(judged: Judged) -> "Dataset":
+    from xarray import Dataset
+
+    columns = zip(FRACTIONS, judged.fractions.T, strict=True)
+    return Dataset({name: ("outcome", values) for name, values in columns}, attrs=judged.action)

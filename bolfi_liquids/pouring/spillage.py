@@ -5,10 +5,13 @@ distances: `Profiles` hold what came out.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..wording import spilled
 
 if TYPE_CHECKING:
     from ..models import Cups
@@ -19,6 +22,7 @@ CVAR_TAIL = 0.1  # share of the draws that CVaR averages
 LANDING_SD = 0.03  # sd of where liquid lands about where it was simulated, over its fall to the rim
 DISTANCE_STEP = 1e-3  # m, between the distances of a profile
 MAX_LANDING_SDS = 5.0  # sd by which liquid may land elsewhere
+SPILLAGE_QUANTILE = 0.95  # of the spilled fraction: one outcome in twenty exceeds it
 
 
 def mean_spillage(spilled: NDArray) -> NDArray[np.float64]:
@@ -93,6 +97,48 @@ class Surface(NamedTuple):
         return dict(zip(ACTION, map(float, chosen), strict=True))
 
 
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """An action and what it spills, on draws that did not choose it.
+
+    Attributes:
+        angular_velocity: Of the source about its lip [rad/s].
+        distance: Horizontally from the lip to the receiver's axis [m].
+        fractions: Spilled, received and retained, shape (outcomes, 3); rows sum to 1. Each draw
+            has several outcomes, as the liquid may land elsewhere than simulated.
+    """
+
+    angular_velocity: float
+    distance: float
+    fractions: NDArray[np.float64]
+
+    @property
+    def action(self) -> dict[str, float]:
+        """`angular_velocity` and `distance`."""
+        return dict(zip(ACTION, (self.angular_velocity, self.distance), strict=True))
+
+    @property
+    def expected_spillage(self) -> float:
+        """Mean spilled fraction."""
+        return float(self.fractions[:, 0].mean())
+
+    @property
+    def spillage_q95(self) -> float:
+        """Spilled fraction that one outcome in twenty exceeds."""
+        return float(np.quantile(self.fractions[:, 0], SPILLAGE_QUANTILE))
+
+    def equals(self, other: "Judged") -> bool:
+        """Whether another one has the same action and the same outcomes."""
+        same = self.action == other.action
+        return same and np.array_equal(self.fractions, other.fractions)
+
+    def __str__(self) -> str:
+        return (
+            f"{np.degrees(self.angular_velocity):.1f} deg/s, {100 * self.distance:.2f} cm, "
+            f"expected to spill {spilled(self.expected_spillage)}"
+        )
+
+
 def reachable_distances(cups: "Cups") -> NDArray[np.float64]:
     """Those of the decision [m], and so far beyond as liquid may land elsewhere."""
     low, high = cups.distance_range
@@ -105,14 +151,15 @@ def surface(profiles: Profiles, cups: "Cups") -> Surface:
     """What the actions of the decision's range spill, wherever the liquid lands."""
     from scipy.ndimage import gaussian_filter1d
 
-    spilled = np.moveaxis(profiles.fractions[..., 0], 1, 0)
     blurred = gaussian_filter1d(
-        spilled, landing_sd(cups) / DISTANCE_STEP, axis=-1, mode="nearest", truncate=MAX_LANDING_SDS
+        np.moveaxis(profiles.fractions[..., 0], 1, 0),
+        landing_sd(cups) / DISTANCE_STEP,
+        axis=-1,
+        mode="nearest",
+        truncate=MAX_LANDING_SDS,
     )
     low, high = cups.distance_range
-    allowed = (profiles.distance > low - DISTANCE_STEP / 2) & (
-        profiles.distance < high + DISTANCE_STEP / 2
-    )
+    allowed = np.abs(profiles.distance - (low + high) / 2) < (high - low + DISTANCE_STEP) / 2
     distance = np.clip(profiles.distance[allowed], low, high)
     return Surface(profiles.angular_velocity, distance, blurred[..., allowed])
 

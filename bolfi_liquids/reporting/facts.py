@@ -15,7 +15,7 @@ from ..criticism.result import Criticism
 from ..criticism.summary import CriticismSummary, DifferingWindow, PourVerdict, SourceVerdict
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..models.numerics import is_tested
-from ..pouring.draining import TENTH, Hold
+from ..pouring.pours import TENTH, Hold
 from ..pouring.result import ActionSummary, GivenPour, GivenSummary, Pour
 from ..wording import (
     LEAST_SPILLED,

@@ -18,7 +18,7 @@ import numpy as np
 from ..files import write_whole
 from ..inputs.cups import kept_cups
 from ..movie.file import encoded
-from ..pouring.landed_pours import Parcels
+from ..pouring.parcels import Parcels
 from ..progress import progress_bar
 from ..run.run import MOVING
 from ..seeds import Phase, simulation_seeds

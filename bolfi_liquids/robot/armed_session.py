@@ -2,18 +2,24 @@
 
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
+
+from rich.console import Console, Group
+from rich.live import Live
 
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from ..hardware import Check, EmulatedRig, HiddenLiquid, Rig, Session, Tool
+    from ..hardware import Check, EmulatedRig, Rig, Session, Tool
     from ..hardware.motion import PosePath
 
 Ask = Callable[[str], str]
 """Shows a person the plan, and returns what the person typed."""
+
+REFRESH_RATE = 5.0  # per second, of the live view
 
 
 class Task(NamedTuple):
@@ -25,7 +31,7 @@ class Task(NamedTuple):
         paths: That will be followed.
         out: Directory of what is recorded; new or empty.
         cameras: Whether the rig's cameras look on.
-        about: What a person is told before the motions.
+        about: What a person reads before the motions.
     """
 
     rig: "Rig"
@@ -42,18 +48,6 @@ class Task(NamedTuple):
         return f"{self.about}\n{describe(self.paths, self.rig, self.tool)}".lstrip()
 
 
-EMULATED_VISCOSITY = 1.0  # Pa s, of a liquid of which nothing is said
-
-
-def hidden_liquid(emulate: "HiddenLiquid | bool") -> "HiddenLiquid | None":
-    """What `emulate` stands for: a liquid, the usual one for True, none for False."""
-    from ..hardware import HiddenLiquid
-
-    if isinstance(emulate, bool):
-        return HiddenLiquid(viscosity=EMULATED_VISCOSITY) if emulate else None
-    return emulate
-
-
 def check_consent(ask: Ask | None, emulate: object, where: str) -> None:
     """Require either a confirmation or the emulator, not both.
 
@@ -68,23 +62,77 @@ def check_consent(ask: Ask | None, emulate: object, where: str) -> None:
         )
 
 
+@dataclass
+class SessionView:
+    """A session and its live view in a terminal.
+
+    Attributes:
+        session: May move the arm.
+        title: What is going on.
+        motions: Of the task, the way to its beginning included.
+        console: Where it is shown.
+        live: What is drawn again and again; None where stderr is no terminal.
+        note: Line beside the view.
+    """
+
+    session: "Session"
+    title: str
+    motions: int
+    console: Console
+    live: Live | None
+    note: str = ""
+
+    def until_done(self, number: int) -> None:
+        """Wait until a path is done.
+
+        Raises:
+            SessionStopped: The arm was stopped.
+        """
+        while not self.session.wait(number, timeout=1.0 / REFRESH_RATE):
+            self.show()
+        self.show()
+
+    def say(self, note: str) -> None:
+        """Keep a line beside the view; where there is no view, print it once."""
+        if self.live is None and note != self.note:
+            self.console.print(note, highlight=False, soft_wrap=True)
+        self.note = note
+
+    def show(self) -> None:
+        """Draw the session as it is now."""
+        if self.live is None:
+            return
+        from ..hardware.board import host_time
+        from ..hardware.session.live import live_table
+
+        status = self.session.status()
+        motion = min(len(status.done) + 1, self.motions)
+        title = f"{self.title}, motion {motion} of {self.motions}"
+        self.live.update(Group(live_table(title, status, host_time()), self.note), refresh=True)
+
+
 @contextmanager
-def armed_session(task: Task, by: "Ask | EmulatedRig") -> "Iterator[Session]":
+def armed_session(
+    task: Task, by: "Ask | EmulatedRig", doing: str = "", *, progress: bool = False
+) -> Iterator[SessionView]:
     """Ask a person, unless the arm is emulated; then a session that may move the arm.
 
     Args:
         task: What will be done.
         by: Shows the plan, and returns the sentence that the plan asks for; or an emulator, which
             nobody is asked about.
+        doing: Title of the view; "" takes the tool's.
+        progress: Whether to show a live view, if stderr is a terminal.
 
     Raises:
         RigError: The person did not agree, or something cannot be used.
     """
     from ..hardware import EmulatedRig, Session, SessionSetup, confirm, webcams
 
+    title = doing or task.tool
     if isinstance(by, EmulatedRig):
         arm, make_cameras, source = by
-        confirmation = None
+        confirmation, title = None, f"{title}, emulated"
     else:
         arm, make_cameras, source = None, webcams(task.rig), "robot"
         text = task.describe()
@@ -100,11 +148,35 @@ def armed_session(task: Task, by: "Ask | EmulatedRig") -> "Iterator[Session]":
         plan=task.paths,
         source=source,
     )
+    console = Console(stderr=True, quiet=not progress)
+    shown = progress and console.is_terminal
+    live = Live(console=console, auto_refresh=False) if shown else None
     session = Session(setup)
     with ExitStack() as closed:
         with session:  # which refuses a directory that holds something
             closed.callback(session.discard_unless_moved)
-            yield session
+            with live or nullcontext():
+                yield SessionView(session, title, 1 + len(task.paths), console, live)
+
+
+@contextmanager
+def told_on_stop(left: Callable[[], str]) -> Iterator[None]:
+    """Say what a session has left where it is stopped within.
+
+    Args:
+        left: What there is to find, or that nothing had moved.
+
+    Raises:
+        SessionStopped: It was stopped, or interrupted; the message ends with what is left.
+    """
+    from ..hardware import SessionInterrupted, SessionStopped
+
+    try:
+        yield
+    except SessionStopped as err:
+        raise SessionStopped(f"{err}; {left()}") from None
+    except KeyboardInterrupt:
+        raise SessionInterrupted(f"interrupted, the arm was stopped; {left()}") from None
 
 
 def dry_run(task: Task) -> "tuple[str, list[Check]]":

@@ -1,32 +1,22 @@
 """Calibration of one of a rig's cameras: its lens by a printed board, its roll by a plumb line."""
 
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import Argument, InputError
+from ..errors import Argument
+from ..files import new_file
 from ..inputs.rigs import rig_of
 
 if TYPE_CHECKING:
     from ..hardware import Camera
-    from ..hardware.vision import CameraModel, CharucoBoard, Intrinsics
+    from ..hardware.rig import View
+    from ..hardware.vision import CameraModel, Intrinsics
 
 BOARD_PICTURES = 15
-
-
-class Pictures(NamedTuple):
-    """Pictures from which a camera is calibrated, grey levels.
-
-    Attributes:
-        boards: Of the board; empty to keep the lens.
-        plumb_line: Of a thread that hangs; None to keep the roll.
-    """
-
-    boards: list[np.ndarray]
-    plumb_line: np.ndarray | None
 
 
 def write_board(path: Path) -> Path:
@@ -38,17 +28,25 @@ def write_board(path: Path) -> Path:
     from ..hardware.vision import CharucoBoard
     from ..hardware.vision.camera_model import opencv
 
-    if path.exists():
-        raise InputError("exists already", where=str(path), fix="name a file that does not")
-    can_be = path.suffix.lower() == ".png" and path.parent.is_dir()
-    if not (can_be and opencv().imwrite(str(path), CharucoBoard().print_image())):
-        raise InputError("cannot be written", where=str(path), fix="name a .png that can be")
+    path = new_file(path, Argument("print_board"), suffix=".png", replace=False)
+    opencv().imwrite(str(path), CharucoBoard().print_image())
     return path
+
+
+@contextmanager
+def _refused(*kinds: type[Exception], where: str, fix: str) -> Iterator[None]:
+    """Turn these errors of hardware into a `RigError` that names what to mend."""
+    from ..hardware import RigError
+
+    try:
+        yield
+    except kinds as err:
+        raise RigError(str(err), where=where, fix=fix) from err
 
 
 def calibrate_view(
     rig: Path | None,
-    view: str,
+    view: "View",
     *,
     square: float,
     boards: Path | None = None,
@@ -59,77 +57,72 @@ def calibrate_view(
 
     Args:
         rig: Its file; None is the bundled one.
-        view: "xz" or "yz".
+        view: Which camera.
         square: Side of a printed square [m].
         boards: Directory of pictures of the board.
         plumb_line: Picture of a plumb line. With neither, the camera takes both.
         out: File of the lens; None is beside the rig's file.
 
     Raises:
-        InputError: `view` or `square` cannot be used.
         RigError: The rig, the camera or the pictures cannot be used.
     """
-    from ..hardware import RigError
-    from ..hardware.rig import View
-    from ..hardware.vision import CalibrationError, CharucoBoard, PlumbLineError
+    from ..hardware.vision import (
+        CalibrationError,
+        CharucoBoard,
+        PlumbLineError,
+        calibrate_intrinsics,
+    )
+    from ..hardware.vision.stick_view import camera_model, orientation
 
-    if view not in get_args(View):
-        raise InputError(f"{view!r}", where=Argument("view"), fix="give xz or yz")
-    if not 0.002 <= square <= 0.2:
-        raise InputError(
-            f"{100 * square:g} cm",
-            where=Argument("square"),
-            fix="give the side of a printed square in cm",
-        )
-    camera = rig_of(rig).camera(view)  # type: ignore[arg-type]
+    camera = rig_of(rig).camera(view)
     usual = CharucoBoard()
     board = CharucoBoard(square=square, marker=square * usual.marker / usual.square)
-    pictures = _pictures(camera, boards, plumb_line)
-    try:
-        lens, model = _lens(camera, pictures, board)
-        if lens is not None:
-            beside = Path(rig).parent if rig is not None else Path()
-            yield from _written(lens, beside / f"camera_{view}.json" if out is None else out)
-        yield _roll(camera, model, pictures.plumb_line)
-    except (CalibrationError, PlumbLineError) as err:
-        raise RigError(str(err), where=f"camera {view}", fix="take the pictures again") from err
-
-
-def _pictures(camera: "Camera", boards: Path | None, plumb_line: Path | None) -> Pictures:
-    """From files, or taken by the camera.
-
-    Raises:
-        RigError: The camera or a file cannot be used.
-    """
-    from ..hardware import RigError
-    from ..hardware.cameras import CameraError
-
     if boards is None and plumb_line is None:
-        try:
-            return _taken(camera)
-        except CameraError as err:
-            where = f"camera {camera.view}: source = {camera.source!r}"
-            raise RigError(str(err), where=where, fix="correct rig.toml") from err
-    on_board = [] if boards is None else _read(boards)
-    return Pictures(on_board, None if plumb_line is None else _read(plumb_line)[0])
+        on_board, thread = _taken(camera)
+    else:
+        on_board = [] if boards is None else _read(boards)
+        thread = None if plumb_line is None else _read(plumb_line)[0]
+    errors, again = (CalibrationError, PlumbLineError), "take the pictures again"
+    with _refused(*errors, where=f"camera {view}", fix=again):
+        if on_board:
+            lens = calibrate_intrinsics(on_board, board)
+            beside = Path() if rig is None else Path(rig).parent
+            yield from _written(lens, beside / f"camera_{view}.json" if out is None else out)
+            model = lens.placed(orientation(camera), np.array(camera.position))
+        else:
+            model = camera_model(camera)
+        yield _roll(camera, model, thread)
 
 
 def _read(path: Path) -> list[np.ndarray]:
-    """All pictures of a directory, of a video, or the one of a file."""
-    from ..hardware import RigError
+    """All pictures of a directory, of a video, or the one of a file; grey levels.
+
+    Raises:
+        RigError: It cannot be used.
+    """
     from ..hardware.cameras import CameraError, FilesCamera
 
-    try:
+    with _refused(CameraError, where=str(path), fix="give a directory of pictures"):
         return [frame.image for frame in iter(FilesCamera(path).read, None)]
-    except CameraError as err:
-        raise RigError(str(err), where=str(path), fix="give a directory of pictures") from err
 
 
-def _taken(camera: "Camera") -> Pictures:
-    """Pictures of the board and of the plumb line, each once a person is ready."""
+def _taken(camera: "Camera") -> tuple[list[np.ndarray], np.ndarray]:
+    """Pictures of the board and of the plumb line, grey levels, each once a person is ready.
+
+    Raises:
+        RigError: The camera cannot be used.
+    """
     from ..hardware.cameras import CameraError, open_camera
 
-    with closing(open_camera(camera)) as source:
+    how = "hold it still, tilted, then press Enter "
+    hang = "plumb line: hang a thread in front of an even background, then press Enter "
+    numbers = range(1, BOARD_PICTURES + 1)
+    asked = [f"board, picture {n} of {BOARD_PICTURES}: {how}" for n in numbers]
+    where = f"camera {camera.view}: source = {camera.source!r}"
+    with (
+        _refused(CameraError, where=where, fix="correct rig.toml"),
+        closing(open_camera(camera)) as source,
+    ):
 
         def after(question: str) -> np.ndarray:
             input(question)
@@ -138,24 +131,7 @@ def _taken(camera: "Camera") -> Pictures:
                 raise CameraError("the camera gives no more pictures")
             return frame.image
 
-        how = "hold it still, tilted, then press Enter "
-        numbers = range(1, BOARD_PICTURES + 1)
-        on_board = [after(f"board, picture {n} of {BOARD_PICTURES}: {how}") for n in numbers]
-        hang = "plumb line: hang a thread in front of an even background, then press Enter "
-        return Pictures(on_board, after(hang))
-
-
-def _lens(
-    camera: "Camera", pictures: Pictures, board: "CharucoBoard"
-) -> "tuple[Intrinsics | None, CameraModel]":
-    """The lens that the board shows, if it does, and the camera with it at the rig's place."""
-    from ..hardware.vision import calibrate_intrinsics
-    from ..hardware.vision.stick_view import camera_model, orientation
-
-    if not pictures.boards:
-        return None, camera_model(camera)
-    lens = calibrate_intrinsics(pictures.boards, board)
-    return lens, lens.placed(orientation(camera), np.array(camera.position))
+        return [after(question) for question in asked], after(hang)
 
 
 def _written(lens: "Intrinsics", path: Path) -> Iterator[str]:

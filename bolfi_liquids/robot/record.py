@@ -1,23 +1,36 @@
 """Recording a stir: the arm, the cameras, and the recording that they leave."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from ..errors import Argument, InputError
 from ..files import disk_errno, given_path
+from ..inputs.described_liquid import COHESION
 from ..inputs.open import check_recording, read_recording
-from ..inputs.recording import Recording
+from ..inputs.recording import Recording, planned_recording
 from ..inputs.rigs import rig_of
+from ..simulation.simulate import described_liquids, simulated
+from ..simulators import stir_simulator
 from ..wording import command
-from .armed_session import Ask, Task, armed_session, check_consent, dry_run, hidden_liquid
-from .hidden_stir import with_stir
-from .live_view import SessionView
-from .stir import StirPlan, follow_plan, plan_stir, stir_task
+from .armed_session import (
+    Ask,
+    SessionView,
+    Task,
+    armed_session,
+    check_consent,
+    dry_run,
+    told_on_stop,
+)
+from .stir import StirPlan, follow_plan, plan_stir
 
 if TYPE_CHECKING:
-    from ..hardware import Check, HiddenLiquid, Rig, Session
+    from ..hardware import Check, HiddenLiquid, Rig
     from ..hardware.motion import PosePath
 
 
@@ -54,17 +67,12 @@ def record(
         MotionRejected: The plan breaks one of the rig's limits.
         SessionStopped: The arm was stopped; the message says why.
     """
-    stir = prepare_stir(rig, out, ask, emulate, cycles)
-    title = "stirring" if ask else "stirring, emulated"
-    with stir_session(stir, title, progress) as (session, view):
-        view.motions = 1 + len(stir.task.paths)
 
-        def wait(number: int, _: "PosePath") -> bool:
-            view.until_done(session, number)
-            return False
+    def wait(view: SessionView, number: int, _: "PosePath") -> bool:
+        view.until_done(number)
+        return False
 
-        follow_plan(session, stir.plan, wait)
-    return finished(stir.task.out)
+    return carried_out(prepare_stir(rig, out, ask, emulate, cycles), wait, progress=progress)
 
 
 class PlannedStir(NamedTuple):
@@ -72,7 +80,7 @@ class PlannedStir(NamedTuple):
 
     Attributes:
         plan: What the arm will do.
-        task: The same for a session.
+        task: The same for a session, which the rig's cameras look at.
         by: Shows a person the plan; or the liquid of an emulated arm with rendered cameras, which
             nobody is asked about.
     """
@@ -90,23 +98,97 @@ def prepare_stir(
     cycles: int | None,
 ) -> PlannedStir:
     """Check and plan a stir; the arguments and errors of `record`."""
+    from ..hardware import HiddenLiquid
+
     check_consent(ask, emulate, "record")
-    opened, hidden = rig_of(rig), hidden_liquid(emulate)
-    plan, directory = plan_stir(opened, cycles), given_path(out, Argument("out"))
-    check_new(directory)
-    by = ask if hidden is None else with_stir(opened, plan, hidden)
+    opened = rig_of(rig)
+    plan, task = _planned(opened, cycles, given_path(out, Argument("out")))
+    hidden = HiddenLiquid() if emulate is True else emulate
+    by = with_stir(opened, plan, hidden) if hidden else ask
     assert by is not None
-    return PlannedStir(plan, stir_task(opened, plan, directory), by)
+    return PlannedStir(plan, task, by)
 
 
-@contextmanager
-def stir_session(
-    stir: PlannedStir, title: str, progress: bool
-) -> "Iterator[tuple[Session, SessionView]]":
-    """A session that may move the arm, and its view; what it records is kept whatever stops it.
+def dry_stir(rig: "Rig", cycles: int | None, out: Path) -> "tuple[str, list[Check]]":
+    """The plan of a stir, and the pre-flight list of a session that cannot move the arm.
 
     Raises:
-        InputError: A camera is a file.
+        InputError, MotionRejected: As `plan_stir`.
+        RigError: `out` holds something, or cannot be used.
+    """
+    _, task = _planned(rig, cycles, out)
+    return dry_run(task)
+
+
+def _planned(rig: "Rig", cycles: int | None, out: Path) -> tuple[StirPlan, Task]:
+    """A plan and its task; a directory that holds something is refused before anything begins."""
+    from ..hardware.recorder.directory import check_empty
+
+    plan = plan_stir(rig, cycles)
+    if out.is_dir():
+        check_empty(out)
+    return plan, Task(rig, "stirring", plan.paths, out, cameras=True)
+
+
+def with_stir(rig: "Rig", plan: StirPlan, liquid: "HiddenLiquid") -> "HiddenLiquid":
+    """The liquid, and how the stick hangs that stirs it along a plan.
+
+    It is simulated before the session, along the path of the emulated arm, which lags its plan and
+    rounds corners off; the arm replays it.
+
+    Args:
+        rig: What is there.
+        plan: That will be followed.
+        liquid: Of which a viscosity is known; one that has a stir keeps it.
+
+    Raises:
+        InputError: The liquid cannot be simulated, or its stir goes wrong.
+        ValueError: The rig cannot be simulated.
+    """
+    from ..hardware import StickMotion, servoed
+    from ..hardware.motion import joined
+    from ..hardware.recorder.finalise import rig_attributes
+    from ..inference.simulations import Compute
+
+    if liquid.stir is not None:
+        return liquid
+    path = servoed(joined(list(plan.strokes)))
+    expected = planned_recording(path.time, path.position, rig_attributes(rig))
+    inclination, fault = np.full((1, 2), np.nan), "its result is not finite"
+    of = {"viscosity": liquid.viscosity, "cohesion": COHESION, "seed": liquid.seed}
+    try:
+        liquids = described_liquids(of, density=rig.liquid.density)
+        (inclination,) = simulated(stir_simulator([expected], 0), liquids, Compute())
+    except InputError as err:
+        raise InputError(err.what, where=f"emulated {err.where}", fix=err.fix) from err
+    except RuntimeError as err:
+        fault = str(err)
+    if not np.isfinite(inclination).all():
+        raise InputError(
+            f"{liquid.viscosity:g} Pa s cannot be stirred along the rig's path: {fault}",
+            where="emulated viscosity",
+            fix="give another viscosity, or another path under [stirring] of rig.toml",
+        )
+    return replace(liquid, stir=StickMotion(path.time, path.position, inclination))
+
+
+def carried_out(
+    stir: PlannedStir,
+    wait: "Callable[[SessionView, int, PosePath], bool]",
+    doing: str = "",
+    *,
+    progress: bool,
+) -> Recording:
+    """The recording of a planned stir; what is recorded is kept whatever stops it.
+
+    Args:
+        stir: Of `prepare_stir`.
+        wait: As of `follow_plan`, of a session with its view.
+        doing: Title of the view; "" is stirring.
+        progress: Whether to show a live view, if stderr is a terminal.
+
+    Raises:
+        InputError: A camera is a file, or the recording cannot be used.
         RigError: The person did not agree, or something cannot be used.
         SessionStopped: The arm was stopped; the message says what was recorded.
     """
@@ -118,12 +200,9 @@ def stir_session(
         by = emulated(rig, above_cup(rig), liquid=by, truth=out)
     else:
         _check_devices(rig)
-    with (
-        save_on_stop(out),
-        armed_session(stir.task, by) as session,
-        SessionView(title, shown=progress) as view,
-    ):
-        yield session, view
+    with save_on_stop(out), armed_session(stir.task, by, doing, progress=progress) as view:
+        follow_plan(view.session, stir.plan, partial(wait, view))
+    return finished(out)
 
 
 def _check_devices(rig: "Rig") -> None:
@@ -134,29 +213,6 @@ def _check_devices(rig: "Rig") -> None:
                 where=f"rig.toml: camera {camera.view}",
                 fix="a real arm moves only while real cameras look on: name a device",
             )
-
-
-def dry_stir(rig: "Rig", cycles: int | None, out: Path) -> "tuple[str, list[Check]]":
-    """The plan of a stir, and the pre-flight list of a session that cannot move the arm.
-
-    Raises:
-        InputError, MotionRejected: As `plan_stir`.
-        RigError: `out` holds something, or cannot be used.
-    """
-    check_new(out)
-    return dry_run(stir_task(rig, plan_stir(rig, cycles), out))
-
-
-def check_new(directory: Path) -> None:
-    """Refuse a directory that holds something, before anything that takes long begins.
-
-    Raises:
-        RigError: It holds something.
-    """
-    from ..hardware.recorder.directory import check_empty
-
-    if directory.is_dir():
-        check_empty(directory)
 
 
 def finished(directory: Path) -> Recording:
@@ -179,21 +235,9 @@ def finished(directory: Path) -> Recording:
     return recording
 
 
-@contextmanager
-def save_on_stop(directory: Path) -> Iterator[None]:
-    """Save the frames taken before a stop as a recording.
-
-    Raises:
-        SessionStopped: It was stopped, or interrupted; the message says what was recorded.
-    """
-    from ..hardware import SessionInterrupted, SessionStopped
-
-    try:
-        yield
-    except SessionStopped as err:
-        raise SessionStopped(f"{err}; {_left(directory)}") from None
-    except KeyboardInterrupt:
-        raise SessionInterrupted(f"interrupted, the arm was stopped; {_left(directory)}") from None
+def save_on_stop(directory: Path) -> AbstractContextManager[None]:
+    """Save the frames taken before a stop as a recording; see `told_on_stop`."""
+    return told_on_stop(partial(_left, directory))
 
 
 def _left(directory: Path) -> str:

@@ -1,19 +1,16 @@
-"""A stir carried out: by the robot, or by an emulated arm with rendered cameras."""
+"""The stir of a rig: planned within its limits, and followed until it is enough."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..errors import Argument, InputError
 from ..inputs.start import REST_TIME, SETTLING_TIME
-from .armed_session import Task
 
 if TYPE_CHECKING:
     from ..hardware import Rig, Session
     from ..hardware.motion import PosePath
-
 
 MIN_REST = REST_TIME + SETTLING_TIME  # s, in which `check_start` sees a recording rest
 PATHS_AHEAD = 2  # paths ordered beyond the one that runs, so that the arm need not wait
@@ -71,11 +68,6 @@ def plan_stir(rig: "Rig", cycles: int | None = None) -> StirPlan:
     return plan
 
 
-def stir_task(rig: "Rig", plan: StirPlan, out: Path) -> Task:
-    """A stir that the rig's cameras look at, recorded in a directory that is new or empty."""
-    return Task(rig, "stirring", plan.paths, out, cameras=True)
-
-
 def follow_plan(
     session: "Session", plan: StirPlan, wait: Callable[[int, "PosePath"], bool]
 ) -> None:
@@ -90,34 +82,29 @@ def follow_plan(
         RigError: The pre-flight list has failures.
         SessionStopped: The arm was stopped.
     """
-    from ..hardware.motion import approach, retract
+    from ..hardware.motion import PosePath, approach, retract
 
-    ordered, enough = list[tuple[int, "PosePath"]](), False
+    ordered, enough = list[tuple[int, PosePath]](), False
 
-    def follow(path: "PosePath") -> None:
+    def follow(path: PosePath) -> None:
         nonlocal enough
         ordered.append((session.follow(path), path))
         # all at once would be checked at once, which takes the cameras' time
         if len(ordered) > PATHS_AHEAD:
             enough = wait(*ordered[-1 - PATHS_AHEAD])
 
-    follow(approach(session.rig, session.pose()))
+    rig, out = session.rig, plan.retract
+    follow(approach(rig, session.pose()))
     follow(plan.insert)
-    for at, stroke in enumerate(plan.strokes):
+    for stroke in plan.strokes:
         follow(stroke)
-        if enough and at + 1 < len(plan.strokes):
-            follow(_still(session.rig, stroke.pose[-1]))
-            follow(retract(session.rig, stroke.pose[-1, :3]))
+        if enough and stroke is not plan.strokes[-1]:
+            # the rest at the end, as the plan's last stroke has it
+            times = np.arange(0.0, rig.stirring.rest, 1.0 / rig.robot.rate)
+            still = np.tile(stroke.pose[-1], (len(times), 1))
+            follow(PosePath(times, still, stirring=True))
+            out = retract(rig, stroke.pose[-1, :3])
             break
-    else:
-        follow(plan.retract)
+    follow(out)
     for last in ordered[-PATHS_AHEAD:]:
         wait(*last)
-
-
-def _still(rig: "Rig", pose: np.ndarray) -> "PosePath":
-    """The rest at the end of a stir that ends early, as the plan's last stroke has it."""
-    from ..hardware.motion import PosePath
-
-    times = np.arange(0.0, rig.stirring.rest, 1.0 / rig.robot.rate)
-    return PosePath(times, np.tile(pose, (len(times), 1)), stirring=True)

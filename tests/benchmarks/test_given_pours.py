@@ -16,10 +16,9 @@ from bolfi_liquids import models
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.pour_table import PourTable
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.pouring.design import joint_prior, whole
-from bolfi_liquids.pouring.landed_pours import Poured
 from bolfi_liquids.pouring.landing_map import LandingMap, learn_map
 from bolfi_liquids.pouring.parcels import parcels_of
+from bolfi_liquids.pouring.pours import Poured, joint_prior, whole
 from bolfi_liquids.simulators import RATE
 
 TRUTHS = 20

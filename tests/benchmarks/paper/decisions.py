@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.pouring.design import joint_prior, whole
-from bolfi_liquids.pouring.landed_pours import Parcels, pours_in
 from bolfi_liquids.pouring.landing_map import LandingMap, learn_map
+from bolfi_liquids.pouring.parcels import Parcels
+from bolfi_liquids.pouring.pours import joint_prior, pours_in, whole
 from bolfi_liquids.pouring.spillage import (
     DISTANCE_STEP,
     Profiles,

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import pytest
 import typer
-from bolfi_liquids.hardware.vision.opencv import opencv
+from bolfi_liquids.hardware.vision.camera_model import opencv
 from typer.main import get_command
 from typer.testing import CliRunner
 

@@ -12,6 +12,7 @@ from bolfi_liquids.inference.simulations.failures import raised
 import bolfi_liquids as bl
 from bolfi_liquids import models
 from bolfi_liquids.calibration.summary import BAD_FIT_RATIO
+from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.inputs.recording import planned_recording
@@ -24,14 +25,10 @@ from bolfi_liquids.online.estimate import (
     fit_to_noise,
     proposals,
 )
-from bolfi_liquids.online.plan import (
-    PartialRecording,
-    align,
-    stroke_ends,
-)
+from bolfi_liquids.online.plan import PartialRecording, align, stroke_ends
 from bolfi_liquids.online.record import BAD_FIT, sentence
 from bolfi_liquids.online.settings import OnlineSettings
-from bolfi_liquids.pouring.result import Judged
+from bolfi_liquids.pouring.spillage import Judged
 from bolfi_liquids.simulators import stir_simulator
 
 ATTRS = {
@@ -87,25 +84,6 @@ def aligned(strokes, seed=1234):
     return align(PLAN, ENDS, data(strokes, seed))
 
 
-def width(found):
-    spread = found.parameters["viscosity"]
-    return np.log(spread.q95 / spread.q05)
-
-
-def test_more_strokes_say_more():
-    of = problem()
-    known = made(of)
-    first, last = (
-        [estimate(of, known, aligned(k, seed), NoMap(), 0.0) for seed in range(6)]
-        for k in (1, len(ENDS))
-    )
-    assert np.mean([width(one) for one in last]) < 0.8 * np.mean([width(one) for one in first])
-    assert [one.strokes for one in last] == [len(ENDS)] * 6
-    # 90 % intervals: that two or more of six miss has a chance of 0.11, three or more 0.016
-    inside = [one.parameters["viscosity"] for one in last]
-    assert sum(spread.q05 < 0.5 < spread.q95 for spread in inside) >= 4
-
-
 def test_missing_samples_equal_a_shorter_recording():
     """What is NaN after a stroke teaches what a recording up to there would have taught."""
     of = problem()
@@ -142,26 +120,18 @@ def test_design_is_the_same_again_and_all_over_the_prior():
     assert len({job.seed for job in jobs}) == 32
 
 
-def test_proposals_are_new_points_with_new_seeds():
+def test_proposals_are_new_points_with_new_seeds_and_failed_ones_are_not_learned_from():
     of = problem()
-    known, seen = made(of), aligned(6).observed
-    first = proposals(of, known, seen, 2)
-    failed = Simulation(None, raised(OSError("it raised")), 0.1)
-    second = proposals(of, known + tuple((job, failed) for job in first), seen, 2)
-    assert first == proposals(of, known, seen, 2)
-    jobs = first + second
-    assert len({job.seed for job in [*jobs, *(job for job, _ in known)]}) == 4 + 16
-    assert len({job.theta["viscosity"] for job in jobs}) == 4
-
-
-def test_failed_simulations_do_not_count_among_those_learned_from():
-    of = problem()
-    known = made(of)
-    one, other = proposals(of, known, aligned(6).observed, 2)
+    known, seen = made(of), aligned(6)
+    first = proposals(of, known, seen.observed, 2)
+    assert first == proposals(of, known, seen.observed, 2)
     failed = Simulation(None, raised(OSError("it raised")), 0.1)
     good = Simulation(signals(TRUTH, [7])[0], None, 0.1)
-    found = estimate(of, (*known, (one, failed), (other, good)), aligned(6), NoMap(), 0.0)
-    assert found.simulations == 17
+    later = (*known, (first[0], failed), (first[1], good))
+    jobs = first + proposals(of, later, seen.observed, 2)
+    assert len({job.seed for job in [*jobs, *(job for job, _ in known)]}) == 4 + 16
+    assert len({job.theta["viscosity"] for job in jobs}) == 4
+    assert estimate(of, later, seen, NoMap(), 0.0).simulations == 17
 
 
 def test_data_are_answered_once_a_stroke_or_refused():
@@ -189,12 +159,10 @@ def test_an_estimate_is_as_late_as_its_stroke_ended_before_it():
     assert found.estimate.lag == pytest.approx(time.monotonic() - now + 0.5, abs=0.5)
 
 
-@pytest.mark.parametrize(
-    ("target", "strokes", "ends"), [(0.02, 9, False), (0.04, 8, False), (0.04, 9, True)]
-)
-def test_it_is_enough_when_one_pour_in_twenty_spills_more_than_the_target(target, strokes, ends):
-    found = OnlineEstimate(strokes, 1.0, {}, {}, 0.01, 0.03, 16, 0.1, 0.0, 0.0, ())
-    assert found.is_enough(OnlineSettings(target=target)) is ends
+def test_it_is_enough_when_one_pour_in_twenty_spills_more_than_the_target():
+    for target, strokes, ends in ((0.02, 9, False), (0.04, 8, False), (0.04, 9, True)):
+        found = OnlineEstimate(strokes, 1.0, {}, {}, 0.01, 0.03, 16, 0.1, 0.0, 0.0, ())
+        assert found.is_enough(OnlineSettings(target=target)) is ends
 
 
 def test_an_estimate_that_fits_nothing_says_so_and_ends_nothing():
@@ -244,20 +212,19 @@ def test_an_online_estimate_names_a_wrong_frame():
         assert not (faults and found.fits)
 
 
-@pytest.mark.parametrize(("name", "value"), [("target", 0.0), ("budget", 3)])
-def test_bad_setting_is_named(name, value):
-    with pytest.raises(ValueError, match=f"online setting {name}: {value!r}"):
-        OnlineSettings(**{name: value})
+def test_a_budget_holds_the_design():
+    with pytest.raises(InputError) as refused:
+        OnlineSettings(design=16, budget=12)
+    assert "budget" in refused.value.where
 
 
 def test_a_simulation_of_the_plan_begins_like_one_of_its_beginning(short_recording):
     """Causality: what comes later changes no bit of what came before."""
     recording = bl.open_recording(short_recording)
-    setup = models.StirSetup.from_recording(recording)
+    setup = models.StirSetup.from_recording(recording, particles=200)
     liquid = models.Liquid([0.02, 1.0], [0.2, 0.7], recording.number("liquid_density"))
     whole = models.stir(liquid, recording.gripper, setup, [3, 4])
-    for samples in (30, 45):
-        begins = type(recording.gripper)(*(part[:samples] for part in recording.gripper))
-        part = models.stir(liquid, begins, setup, [3, 4])
-        # the curve through the last samples bends by those that follow
-        np.testing.assert_array_equal(part[:, :-3], whole[:, : samples - 3])
+    begins = type(recording.gripper)(*(part[:45] for part in recording.gripper))
+    part = models.stir(liquid, begins, setup, [3, 4])
+    # the curve through the last samples bends by those that follow
+    np.testing.assert_array_equal(part[:, :-3], whole[:, :42])

@@ -47,10 +47,20 @@ class MadeUp(NamedTuple):
         return models.Landings(position, kept)
 
 
+@pytest.fixture(scope="session")
+def make_up():
+    """Pours are made up as long as a monkeypatch lasts."""
+
+    def patched(patch):
+        made = MadeUp([])
+        patch.setattr(models, "landings", made.landings)
+        patch.setattr(models, "draining", made.draining)
+        return made
+
+    return patched
+
+
 @pytest.fixture
-def made_up(monkeypatch):
+def made_up(make_up, monkeypatch):
     """Pours are made up."""
-    made = MadeUp([])
-    monkeypatch.setattr(models, "landings", made.landings)
-    monkeypatch.setattr(models, "draining", made.draining)
-    return made
+    return make_up(monkeypatch)

@@ -16,7 +16,6 @@ from bolfi_liquids import models
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.settings import PourSettings
 from bolfi_liquids.pouring.choose import decided, strata
 from bolfi_liquids.pouring.landing_map import LANDINGS_PER_DRAW
@@ -60,7 +59,7 @@ def test_a_person_may_insist(far_off, pour, pour_settings):
         assert bl.Pour.open(run).summary.fit_status == tree.attrs["fit_status"] == status
 
 
-def test_fractions_add_up_and_the_action_is_allowed(pour, pour_settings):
+def test_the_chosen_action_is_allowed_and_among_the_better_ones(pour, pour_settings):
     cups = pour_settings["cups"]
     for judged in (pour.chosen, pour.plug_in):
         np.testing.assert_allclose(judged.fractions.sum(axis=1), 1.0)
@@ -69,22 +68,15 @@ def test_fractions_add_up_and_the_action_is_allowed(pour, pour_settings):
         assert low <= judged.angular_velocity <= high
         low, high = cups.distance_range
         assert low <= judged.distance <= high
-        assert judged.expected_spillage <= judged.fractions[:, 0].max()
-
-
-def test_chosen_spills_no_more_than_the_plug_in(pour):
     difference = by_draw(pour.chosen) - by_draw(pour.plug_in)
     assert difference.mean() <= 4.0 * difference.std(ddof=1) / np.sqrt(len(difference))
+    risk = xr.load_datatree(pour.path / "pour.nc")["actions"]["risk"].to_numpy()
+    assert pour.chosen.expected_spillage < np.quantile(risk, 0.2)
 
 
 def by_draw(judged):
     """Spilled fraction of each posterior draw, whose landings are no independent outcomes."""
     return judged.fractions[:, 0].reshape(-1, LANDINGS_PER_DRAW).mean(axis=1)
-
-
-def test_chosen_is_among_the_better_actions(pour):
-    risk = xr.load_datatree(pour.path / "pour.nc")["actions"]["risk"].to_numpy()
-    assert pour.chosen.expected_spillage < np.quantile(risk, 0.2)
 
 
 @pytest.mark.slow
@@ -116,12 +108,10 @@ def test_the_action_is_that_of_pours_known_in_closed_form(made_up, calibration, 
     assert pour.plug_in.distance == pytest.approx(best, abs=0.006)
 
 
-def test_no_draw_that_judges_has_chosen(pour, calibration, pour_settings):
-    search, judge = strata(calibration, pour_settings["draws"], 0)
+def test_no_draw_that_judges_has_chosen(calibration):
+    search, judge = strata(calibration, 16, 0)
+    assert (len(search["viscosity"]), len(judge["viscosity"])) == (16, 32)
     assert not np.isin(judge["viscosity"], search["viscosity"]).any()
-    liquids = xr.load_datatree(pour.path / "pour.nc")["liquids"]
-    np.testing.assert_array_equal(liquids["viscosity"], search["viscosity"])
-    assert len(pour.chosen.fractions) % (LANDINGS_PER_DRAW * len(judge["viscosity"])) == 0
 
 
 def test_an_effect_that_does_not_act_in_pours_needs_no_new_ones(
@@ -183,19 +173,21 @@ def test_a_choice_that_was_killed_goes_on_from_its_pours(
     assert again.chosen.equals(whole.chosen) and again.plug_in.equals(whole.plug_in)
 
 
-def test_section_is_of_the_pour(pour, calibration, pour_settings):
+def test_section_and_file_are_of_the_pour(pour, calibration, pour_settings):
     section = json.loads((pour.path / "summary.json").read_text())["pour"]
-    assert section["expected_spillage"] == pytest.approx(pour.chosen.fractions[:, 0].mean())
-    assert section["spillage_q95"] == pytest.approx(np.quantile(pour.chosen.fractions[:, 0], 0.95))
-    assert section["angular_velocity_deg_s"] == pytest.approx(
-        np.degrees(pour.chosen.angular_velocity)
-    )
-    assert section["distance_cm"] == pytest.approx(100 * pour.chosen.distance)
-    floor = bundled_cups().least_viscosity(calibration.liquid_density)
+    for judged, held in ((pour.chosen, section), (pour.plug_in, section["plug_in"])):
+        spilled, received, _ = judged.fractions.T
+        assert held["expected_spillage"] == pytest.approx(spilled.mean())
+        assert held["spillage_q95"] == pytest.approx(np.quantile(spilled, 0.95))
+        assert held["received_q05"] == pytest.approx(np.quantile(received, 0.05))
+        assert held["angular_velocity_deg_s"] == pytest.approx(np.degrees(judged.angular_velocity))
+        assert held["distance_cm"] == pytest.approx(100 * judged.distance)
+    floor = pour_settings["cups"].least_viscosity(calibration.liquid_density)
     assert section["least_viscosity"] == pytest.approx(floor, rel=1e-12) and floor > 0.0
-    plug_in = section["plug_in"]["expected_spillage"]
-    assert plug_in == pytest.approx(pour.plug_in.expected_spillage, rel=1e-12)
     tree = xr.load_datatree(pour.path / "pour.nc")
+    search, judge = strata(calibration, pour_settings["draws"], 0)
+    np.testing.assert_array_equal(tree["liquids"]["viscosity"], search["viscosity"])
+    assert len(pour.chosen.fractions) % (LANDINGS_PER_DRAW * len(judge["viscosity"])) == 0
     assert section["n_simulations"] == pour_settings["budget"] == tree["pours"].sizes["pour"]
     missed = tree["pours"]["missed"].to_numpy()
     assert section["map_error"] == pytest.approx(np.sqrt(np.mean(missed**2)), rel=1e-9)
@@ -203,74 +195,29 @@ def test_section_is_of_the_pour(pour, calibration, pour_settings):
     assert bl.Calibration.open(pour.path).summary == calibration.summary  # left as it was
 
 
-def test_choosing_again_simulates_nothing(pour, pour_settings):
-    before = rows(pour.path)
-    again = bl.choose_pour(pour.path, **pour_settings, progress=False)
-    assert rows(pour.path) == before
-    np.testing.assert_array_equal(again.chosen.fractions, pour.chosen.fractions)
-
-
-def test_more_draws_than_there_are_is_said_in_the_setting_s_terms(calibration):
-    with pytest.raises(ValueError, match=r"^draws: 1334 needs 4002 posterior draws.*give 1333"):
-        bl.choose_pour(calibration, draws=1334, progress=False)
-
-
-@pytest.mark.parametrize(
-    ("setting", "value"),
-    [
-        ("budget", 23),
-        ("budget", 101),
-        ("iterations", 2),
-        ("draws", 0),
-        ("risk", "median"),
-        ("seed", -1),
-    ],
-)
+@pytest.mark.parametrize(("setting", "value"), [("budget", 101), ("draws", 1334)])
 def test_bad_setting_is_named(calibration, setting, value):
-    with pytest.raises(ValueError, match=f"^{setting}: {value!r}"):
+    with pytest.raises(InputError) as refused:
         bl.choose_pour(calibration, progress=False, **{setting: value})
+    assert refused.value.where == setting and str(value) in str(refused.value)
 
 
-def test_a_pour_is_read_as_it_was_written(pour):
-    again = bl.Pour.open(pour.path)
-    for name in ("chosen", "plug_in"):
-        judged, read = getattr(pour, name), getattr(again, name)
-        assert read.action == judged.action
-        np.testing.assert_array_equal(read.fractions, judged.fractions)
-    summary = again.summary
-    assert summary.expected_spillage == pour.chosen.expected_spillage
-    assert PourSummary.from_json(summary.to_json()) == summary
-
-
-def test_a_pour_shows_what_was_chosen(pour):
+def test_a_pour_is_read_as_it_was_written(pour, pour_settings):
+    before, again = rows(pour.path), bl.Pour.open(pour.path)
+    chosen_again = bl.choose_pour(pour.path, **pour_settings, progress=False)
+    for other in (again, chosen_again):
+        assert other.chosen.equals(pour.chosen) and other.plug_in.equals(pour.plug_in)
+        assert other.summary == PourSummary.from_json(other.summary.to_json()) == pour.summary
+    assert rows(pour.path) == before
     speed = f"{np.degrees(pour.chosen.angular_velocity):.1f} deg/s"
     for shown in (repr(pour), pour._repr_html_()):
         assert str(pour.path) in shown and speed in shown
 
 
-@pytest.mark.parametrize("given", [False, True])
-def test_the_map_marks_both_actions_among_the_risks(pour, given):
-    figure = new_figure(4.0, 3.0)
-    axes = figure.subplots() if given else None
-    drawn = pour.plot_map(axes)
-    assert (drawn is axes) == given
-    marked = {line.get_label(): line.get_xydata()[0] for line in drawn.get_lines()}
+def test_the_map_marks_both_actions_among_the_risks(pour):
+    axes = new_figure(4.0, 3.0).subplots()
+    assert pour.plot_map(axes) is axes
+    marked = {line.get_label(): line.get_xydata()[0] for line in pour.plot_map().get_lines()}
     for label, judged in (("chosen pour", pour.chosen), ("best at θ* alone", pour.plug_in)):
         at = np.degrees(judged.angular_velocity), 100.0 * judged.distance
         np.testing.assert_allclose(marked[label], at)
-
-
-def test_a_pour_that_is_not_the_run_s_own_is_refused(pour):
-    chosen = pour.chosen
-    others = (
-        replace(chosen, distance=chosen.distance + 1e-3),
-        replace(chosen, fractions=chosen.fractions[:, ::-1]),
-    )
-    for other in others:
-        with pytest.raises(ValueError, match="another pour"):
-            replace(pour, chosen=other).check_current(Run.open(pour.path))
-
-
-def test_a_run_without_a_pour_says_how_to_choose_one(calibration):
-    with pytest.raises(InputError, match="bolfi-liquids pour"):
-        bl.Pour.open(calibration.path)

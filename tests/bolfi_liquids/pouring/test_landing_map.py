@@ -7,14 +7,12 @@ import pytest
 from bolfi_liquids.inference.simulations import Compute
 from scipy.special import ndtr
 
-from bolfi_liquids import inference, models
+from bolfi_liquids import inference
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.inputs.settings import PRIOR_POURS
-from bolfi_liquids.pouring.design import Box, joint_prior, whole
-from bolfi_liquids.pouring.landed_pours import Parcels, Poured, pours_in
 from bolfi_liquids.pouring.landing_map import learn_map
-from bolfi_liquids.pouring.parcels import PARCELS
+from bolfi_liquids.pouring.parcels import PARCELS, Parcels
+from bolfi_liquids.pouring.pours import Box, Poured, joint_prior, pours_in, whole
 from bolfi_liquids.pouring.spillage import landing_sd
 from bolfi_liquids.simulators import PourSimulator
 
@@ -42,6 +40,10 @@ def pours_of(effects=()):
     return PourSimulator(CUPS, 1000.0, Parcels(), effects)
 
 
+def poured_in(bank, box, count=POURS, pours=None):
+    return pours_in(box, pours or pours_of(box.effects), count, Compute(bank=bank))
+
+
 def liquids_in(box, count, seed=5):
     rng = np.random.default_rng(seed)
     u = rng.uniform(box.low, box.high, (count, len(box.low)))
@@ -59,7 +61,7 @@ def expected(made_up, liquid, rate, distance):
 
 def test_the_map_says_what_every_pour_spills(made_up, bank):
     box = box_of()
-    learned = learn_map(box, CUPS, pours_in(box, pours_of(), POURS, Compute(bank=bank)))
+    learned = learn_map(box, CUPS, poured_in(bank, box))
     assert learned.rms_error < 0.005
     liquids = liquids_in(box, 64)
     found = learned.surface(liquids, rates=5)
@@ -81,7 +83,7 @@ def noisy(poured):
 def test_chance_between_pours_counts_in_what_is_expected(made_up, bank):
     """Where spilling begins, a shift either way spills more on average."""
     box = box_of()
-    poured = pours_in(box, pours_of(), POURS, Compute(bank=bank))
+    poured = poured_in(bank, box)
     learned, known = (learn_map(box, CUPS, made) for made in (noisy(poured), poured))
     shifts = learned.emulation.missed[:, 1 : 1 + PARCELS].mean(axis=1)
     assert 0.7 * NOISE < np.sqrt(np.mean(shifts**2)) < 1.5 * NOISE
@@ -94,7 +96,7 @@ def test_chance_between_pours_counts_in_what_is_expected(made_up, bank):
 def test_what_is_wrong_somewhere_is_seen_in_pours_that_are_left_out(made_up, bank):
     """A map that saw each pour would repeat it; the error is of one that did not."""
     box = box_of()
-    poured = pours_in(box, pours_of(), POURS, Compute(bank=bank))
+    poured = poured_in(bank, box)
     rows = poured.rows.copy()
     rows[7, 1 : 1 + PARCELS] += 0.02
     learned = learn_map(box, CUPS, Poured(poured.theta, rows))
@@ -104,44 +106,38 @@ def test_what_is_wrong_somewhere_is_seen_in_pours_that_are_left_out(made_up, ban
 
 def test_nothing_is_poured_twice(made_up, bank):
     box = box_of()
-    first = pours_in(box, pours_of(), POURS, Compute(bank=bank))
+    first = poured_in(bank, box)
     assert sum(made_up.calls) == POURS and max(made_up.calls) <= 8
-    again = pours_in(box, pours_of(), POURS, Compute(bank=bank))
+    again = poured_in(bank, box)
     assert sum(made_up.calls) == POURS
     np.testing.assert_array_equal(again.rows, first.rows)
-    more = pours_in(box, pours_of(), 2 * POURS, Compute(bank=bank))
+    more = poured_in(bank, box, 2 * POURS)
     assert sum(made_up.calls) == 2 * POURS == len(more.rows)
 
 
-def test_a_box_beside_another_pours_what_that_lacks(made_up, bank):
-    pours_in(box_of(part=(0.5, 0.75)), pours_of(), POURS, Compute(bank=bank))
+def test_a_box_takes_what_others_poured_in_it_and_pours_what_they_lack(made_up, bank):
+    poured_in(bank, box_of())
     before = sum(made_up.calls)
     box = box_of(part=(0.5625, 0.8125))
-    found = pours_in(box, pours_of(), POURS, Compute(bank=bank))
+    found = poured_in(bank, box)
     assert 0 < sum(made_up.calls) - before < 0.5 * POURS
     assert box.holds(box.prior.to_unit(found.theta)).all()
-
-
-def test_all_pours_in_the_bank_are_taken_whatever_asked_for_them(made_up, bank):
-    pours_in(box_of(part=(0.0, 1.0)), pours_of(), 4 * POURS, Compute(bank=bank))
-    few = pours_in(box_of(part=(0.5, 0.75)), pours_of(), 24, Compute(bank=bank))
-    assert sum(made_up.calls) == 4 * POURS and len(few.rows) > 1.5 * 24
+    few = poured_in(bank, box_of(), 24)
+    assert len(few.rows) == POURS and box_of().holds(box.prior.to_unit(few.theta)).all()
 
 
 def test_other_cups_or_another_density_share_nothing(made_up, bank):
-    box = box_of()
-    pours_in(box, pours_of(), 24, Compute(bank=bank))
-    pours_in(box, PourSimulator(CUPS, 900.0, Parcels()), 24, Compute(bank=bank))
     source = CUPS.source.model_copy(update={"fill": 0.03})
     fuller = replace(pours_of(), cups=CUPS.model_copy(update={"source": source}))
-    pours_in(box, fuller, 24, Compute(bank=bank))
+    for pours in (pours_of(), PourSimulator(CUPS, 900.0, Parcels()), fuller):
+        poured_in(bank, box_of(), 24, pours)
     assert sum(made_up.calls) == 3 * 24
 
 
 def test_pours_without_an_effect_are_pours_with_its_neutral_coefficient(made_up, bank):
-    pours_in(box_of(), pours_of(), POURS, Compute(bank=bank))
+    poured_in(bank, box_of())
     box = box_of(("adhesion",))
-    poured = pours_in(box, pours_of(("adhesion",)), POURS, Compute(bank=bank))
+    poured = poured_in(bank, box)
     assert sum(made_up.calls) == 2 * POURS == len(poured.rows)
     assert (poured.theta["adhesion"] == 0.0).sum() == POURS
     learned = learn_map(box, CUPS, poured)
@@ -161,41 +157,23 @@ def test_a_pour_that_fails_is_left_out(made_up, bank, monkeypatch):
 
     monkeypatch.setattr("bolfi_liquids.models.landings", failing)
     box = box_of()
-    poured = pours_in(box, pours_of(), POURS, Compute(bank=bank))
+    poured = poured_in(bank, box)
     assert 24 < len(poured.rows) < POURS and (poured.theta["angular_velocity"] < 2.5).all()
     assert learn_map(box, CUPS, poured).rms_error < 0.01
 
 
 def test_too_few_pours_are_no_map(made_up, bank):
     box = box_of()
-    poured = pours_in(box, pours_of(), 12, Compute(bank=bank))
+    poured = poured_in(bank, box, 12)
     with pytest.raises(RuntimeError, match="12 pours.*needs 16"):
         learn_map(box, CUPS, poured)
 
 
 def test_liquids_beyond_the_box_are_taken_at_its_edge(made_up, bank):
     box: Box = box_of()
-    learned = learn_map(box, CUPS, pours_in(box, pours_of(), POURS, Compute(bank=bank)))
+    learned = learn_map(box, CUPS, poured_in(bank, box))
     edge = box.prior.from_unit(np.array([[0.75, 0.5, 0.5]]))
     far = {**edge, "viscosity": np.array([19.0])}
     at = np.array([1.0])
     same = (learned.profiles(at, one, np.zeros(1, int)).fractions for one in (edge, far))
     np.testing.assert_allclose(*same, atol=1e-9)
-
-
-@pytest.mark.minutes
-def test_a_map_of_all_liquids_says_what_new_pours_spill(bank):
-    """Of liquids and seeds that it does not hold, as far as its own error says."""
-    pours, rng = pours_of(), np.random.default_rng(5)
-    box = whole(joint_prior(default_prior(), (), CUPS))
-    learned = learn_map(box, CUPS, pours_in(box, pours, PRIOR_POURS, Compute(bank=bank)))
-    drawn = default_prior().from_unit(rng.uniform(size=(24, 2)))
-    found = learned.surface({name: np.repeat(v, 4) for name, v in drawn.items()}, rates=5)
-    rate = found.angular_velocity[2]
-    made = models.landings(models.Liquid(**drawn, density=1000.0), rate, CUPS, np.arange(24))
-    off = landing_sd(CUPS) * rng.standard_normal((400, 1))
-    for column in (10, 30, 50):
-        poured = made.into(found.distance[column] + off, CUPS.receiver.radius).spilled.mean(axis=0)
-        missed = poured - found.spilled[:, 2, column].reshape(24, 4).mean(axis=1)
-        # an RMS of 24 errors is off by a seventh (sd)
-        assert np.sqrt(np.mean(missed**2)) < 1.6 * learned.rms_error

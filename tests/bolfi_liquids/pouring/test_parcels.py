@@ -47,11 +47,8 @@ def test_more_parcels_than_particles_share_them():
     assert spilled == pytest.approx([0.1, 0.2], abs=0.002)
 
 
-def test_what_stays_in_the_source_is_not_spilled():
-    landings = models.Landings(np.full((1, 10, 2), np.nan, np.float32), np.ones(1))
-    assert fractions_of(parcels_of(landings), DISTANCE, RADIUS)[0, :, 2] == pytest.approx(1.0)
-
-
-def test_a_diverged_pour_is_no_row():
-    landings = models.Landings(np.full((1, 10, 2), np.nan, np.float32), np.array([np.nan]))
-    assert np.isnan(parcels_of(landings)).all()
+def test_what_stays_in_the_source_is_not_spilled_and_a_diverged_pour_is_no_row():
+    nothing = np.full((2, 10, 2), np.nan, np.float32)
+    stays, diverged = parcels_of(models.Landings(nothing, np.array([1.0, np.nan])))
+    assert fractions_of(stays[None], DISTANCE, RADIUS)[0, :, 2] == pytest.approx(1.0)
+    assert np.isnan(diverged).all()

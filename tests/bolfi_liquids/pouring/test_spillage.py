@@ -34,15 +34,6 @@ def test_a_step_is_blurred_as_a_normal_error_blurs_it():
     assert blurred.distance[0] == 0.0 and blurred.distance[-1] == 0.07
 
 
-def test_the_middle_of_where_nothing_is_spilled_is_taken():
-    """Not its edge, where an error of a millimetre spills."""
-    cups = bundled_cups()
-    best = surface(
-        profiles_of(lambda rate, p: np.where(np.abs(p - 0.04) < 0.015, 0.0, 1.0) + 0 * rate), cups
-    ).least("mean")
-    assert best["distance"] == pytest.approx(0.04, abs=2 * DISTANCE_STEP)
-
-
 def test_risks_choose_differently():
     """One draw in ten spills much at 2 cm, none at 5 cm."""
     cups = bundled_cups()

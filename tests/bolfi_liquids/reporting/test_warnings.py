@@ -13,15 +13,15 @@ from bolfi_liquids.calibration.figures import rms_by
 from bolfi_liquids.calibration.summary import FitStatus, bad_fit
 from bolfi_liquids.criticism.summary import PourVerdict
 from bolfi_liquids.inputs.cups import bundled_cups
-from bolfi_liquids.pouring.draining import Hold
 from bolfi_liquids.pouring.figures import not_surely_worse
+from bolfi_liquids.pouring.pours import Hold
 from bolfi_liquids.pouring.result import (
     ActionSummary,
     GivenPour,
     GivenSummary,
-    Judged,
     PourSummary,
 )
+from bolfi_liquids.pouring.spillage import Judged
 from bolfi_liquids.reporting.warnings import Results, warnings_of
 
 FINE = {

@@ -1,63 +1,45 @@
 """Arguments mean the same in `record` and in `execute_pour`."""
 
+from types import SimpleNamespace
+
 import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids import hardware
-from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.rigs import rig_of
-from bolfi_liquids.robot.armed_session import EMULATED_VISCOSITY, hidden_liquid
-from bolfi_liquids.robot.live_view import SessionView
+from bolfi_liquids.online.record import Learning
 
 
-def test_an_emulated_liquid_may_be_given_or_left_to_the_emulator():
-    thick = hardware.HiddenLiquid(viscosity=7.0)
-    assert hidden_liquid(thick) is thick
-    assert hidden_liquid(False) is None
-    usual = hidden_liquid(True)
-    assert usual is not None and usual.viscosity == EMULATED_VISCOSITY
+def test_a_copy_of_a_rig_is_checked_before_anybody_is_asked(tmp_path):
+    rig = hardware.bundled_rig()
+    wrong = rig.model_copy(update={"limits": rig.limits.model_copy(update={"speed": 2.0})})
+    with pytest.raises(hardware.RigError, match="speed"):
+        bl.record(wrong, out=tmp_path / "out", ask=lambda plan: pytest.fail(plan))
 
 
 def test_a_rig_may_be_itself_or_its_file_or_none(tmp_path):
     bundled = hardware.bundled_rig()
     assert rig_of(bundled) is bundled
     assert rig_of(None) == bundled
-    with pytest.raises(ValueError, match=r"none\.toml"):
-        rig_of(tmp_path / "none.toml")
+    for wrong in (tmp_path / "none.toml", {"robot": 1}):
+        with pytest.raises(ValueError, match=r"none\.toml|rig"):
+            rig_of(wrong)  # pyright: ignore
 
 
-@pytest.mark.parametrize(
-    ("section", "number"),
-    [("limits", {"speed": 2.0}), ("robot", {"stirring_orientation": (0.0, 0.0, 0.0)})],
-)
-def test_a_copy_of_a_rig_is_checked_before_anybody_is_asked(tmp_path, section, number):
-    rig = hardware.bundled_rig()
-    part = getattr(rig, section).model_copy(update=number)
-    wrong = rig.model_copy(update={section: part})
-    (name,) = number
-    with pytest.raises(hardware.RigError, match=name):
-        bl.record(wrong, out=tmp_path / "out", ask=lambda plan: pytest.fail(plan))
-    with pytest.raises(hardware.RigError, match=name):
-        rig_of(wrong)
-    with pytest.raises(InputError, match="no rig"):
-        rig_of({"robot": 1})  # pyright: ignore
-
-
-@pytest.mark.parametrize("shown", [False, True])
-def test_what_went_wrong_is_logged_once_whether_a_view_is_shown_or_not(caplog, capsys, shown):
-    with SessionView("stirring", shown=shown) as view:
-        for _ in range(3):
-            view.warn("calibration failed: no memory")
+def test_what_went_wrong_while_learning_is_logged_once(caplog):
+    view = SimpleNamespace(show=lambda: None)
+    learning = Learning(SimpleNamespace(phase="failed", detail="no memory"))
+    for _ in range(3):
+        learning._take(None, view)
     (record,) = caplog.records
     assert record.getMessage() == "calibration failed: no memory"
     assert record.levelname == "WARNING"
-    assert capsys.readouterr().err.count("no memory") <= 1  # by the command line's handler
 
 
-@pytest.mark.parametrize("emulate", [False, True])
-def test_neither_or_both_of_ask_and_emulate_are_refused(tmp_path, emulate):
-    ask = (lambda plan: "") if emulate else None
-    with pytest.raises(ValueError, match="neither or both"):
-        bl.execute_pour(tmp_path, ask=ask, emulate=emulate)
-    with pytest.raises(ValueError, match="neither or both"):
-        bl.record(out=tmp_path / "out", ask=ask, emulate=emulate)
+def test_neither_or_both_of_ask_and_emulate_are_refused(tmp_path):
+    for consent in ({"ask": None, "emulate": False}, {"ask": lambda _: "", "emulate": True}):
+        with pytest.raises(ValueError, match="neither or both"):
+            bl.execute_pour(tmp_path, **consent)
+        with pytest.raises(ValueError, match="neither or both"):
+            bl.record(out=tmp_path / "out", **consent)
+    assert not (tmp_path / "out").exists()

@@ -67,12 +67,9 @@ def test_a_plumb_line_alone_keeps_the_lens(pictures, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    "options",
-    [["--view", "xy"], ["--square", "0.1"], ["--boards", "nowhere"], ["--plumb-line", "x"]],
-)
-def test_what_cannot_be_used_is_named(options, tmp_path, monkeypatch):
+def test_what_cannot_be_used_is_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(app, ["rig", "calibrate-cameras", *options])
-    assert done.exit_code != 0
-    assert options[0] in done.stderr or options[1] in done.stderr
+    rows = {"--view": "xy", "--square": "0.1", "--boards": "nowhere", "--plumb-line": "gone.png"}
+    for option, value in rows.items():
+        done = CliRunner().invoke(app, ["rig", "calibrate-cameras", option, value])
+        assert done.exit_code == 2 and (option in done.stderr or value in done.stderr)

@@ -1,13 +1,11 @@
 """Which pours are asked for: all over the posterior, and few that another posterior has not."""
 
 import numpy as np
-import pytest
 
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.pouring.design import (
+from bolfi_liquids.pouring.pours import (
     RATE,
-    acting_in_pours,
     box_around,
     joint_prior,
     whole,
@@ -43,15 +41,10 @@ def test_pours_cover_the_posterior_and_every_angular_velocity():
     assert np.log(viscosity.max() / viscosity.min()) < np.log(5.0)  # and not much more
 
 
-def test_the_same_pours_are_asked_for_again():
-    box = box_of(posterior(0.4))
-    assert named(box, 64) == named(box_of(posterior(0.4)), 64)
-    assert named(box, 40) < named(box, 64)
-
-
 def test_a_posterior_that_hardly_moved_asks_for_nothing_new():
-    before = named(box_of(posterior(0.4)), 64)
-    assert named(box_of(posterior(0.4, sd=0.152)), 64) == before
+    box, moved = box_of(posterior(0.4)), box_of(posterior(0.4, sd=0.152))
+    assert np.array_equal(box.low, moved.low) and np.array_equal(box.high, moved.high)
+    assert named(box, 40) < named(box, 64) == named(moved, 64)
 
 
 def test_a_posterior_beside_the_first_asks_for_what_that_lacks():
@@ -65,20 +58,14 @@ def theta_of(jobs):
     return {name: np.array([job.theta[name] for job in jobs]) for name in jobs[0].theta}
 
 
-def test_the_best_liquid_lies_inside():
-    draws = posterior(0.4)
-    best = {"viscosity": 2.0, "cohesion": 0.05}
-    prior = joint_prior(default_prior(), (), bundled_cups())
-    box = box_around(prior, draws, best)
-    assert box.holds(prior.to_unit({**best, RATE: 1.0})[None]).all()
-
-
-def test_pours_without_an_effect_lie_in_the_box_with_it():
+def test_the_best_liquid_lies_inside_with_and_without_an_effect():
     draws = posterior(0.4, adhesion=np.linspace(0.5, 0.7, 2000))
-    box = box_of(draws, ("adhesion",))
+    prior = joint_prior(default_prior(), ["adhesion"], bundled_cups())
+    best = {"viscosity": 2.0, "cohesion": 0.05, "adhesion": 0.9}
+    box = box_around(prior, draws, best)
     assert box.effects == ("adhesion",)
-    without = {"viscosity": 0.4, "cohesion": 0.5, "adhesion": 0.0, RATE: 1.0}
-    assert box.holds(box.prior.to_unit(without)[None]).all()
+    for liquid in (best, {**best, "adhesion": 0.0}):
+        assert box.holds(prior.to_unit({**liquid, RATE: 1.0})[None]).all()
 
 
 def test_a_posterior_as_narrow_as_can_be_has_a_box_with_pours_in_it():
@@ -89,8 +76,9 @@ def test_a_posterior_as_narrow_as_can_be_has_a_box_with_pours_in_it():
 
 
 def test_only_effects_of_pours_are_inputs():
-    names = ["camera_tilt", "yield_stress", "adhesion", "gripper_scale"]
-    assert acting_in_pours(names) == ("adhesion", "yield_stress")
+    names = ["camera_tilt", "yield_stress", "adhesion", "gripper_scale", "viscosity"]
+    prior = joint_prior(default_prior(), names, bundled_cups())
+    assert prior.names == ("viscosity", "cohesion", "adhesion", "yield_stress", RATE)
 
 
 def test_pours_of_like_viscosity_and_duration_come_together():
@@ -100,8 +88,3 @@ def test_pours_of_like_viscosity_and_duration_come_together():
     assert np.ptp(batches, axis=1).mean() < 0.2 * np.ptp(batches)
     turning = np.log(jobs[RATE]).reshape(16, 8)
     assert np.median(np.ptp(turning, axis=1)) < 0.8 * np.ptp(turning)
-
-
-@pytest.mark.parametrize("count", [24, 100])
-def test_no_more_are_asked_for_than_may_be(count):
-    assert len(whole(joint_prior(default_prior(), (), bundled_cups())).jobs(count)) == count
