@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..inputs.fields import PLANE_NAMES
+from ..inputs.recording import PLANE_NAMES
 from ..inputs.strokes import stroke_numbers
 from ..models.numerics import cells_in_radius
 from ..simulators import StirSimulator

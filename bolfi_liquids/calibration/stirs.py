@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Argument, InputError
-from ..inputs.fields import PLANE_NAMES
-from ..inputs.recording import Recording
+from ..inputs.recording import PLANE_NAMES, Recording
 from ..inputs.strokes import resting, speed, strokes
 from ..simulators import StirSimulator
 

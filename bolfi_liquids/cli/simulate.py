@@ -6,11 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..inputs.described_liquid import (
-    COHESION,
-    DENSITY,
-    VISCOSITY,
-)
+from ..inputs.described_liquid import COHESION, DENSITY, VISCOSITY
 from .compute import ComputeOptions
 from .examples import examples
 from .grouped import grouped

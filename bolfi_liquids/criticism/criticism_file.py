@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..inference.criticism.verdict_kind import VerdictKind
-from ..inputs.fields import PLANE_NAMES
 from ..inputs.pour_table import PourTable
+from ..inputs.recording import PLANE_NAMES
 from ..simulators import StirSimulator
 from .inputs import Inputs
 from .pours import OUTCOMES

@@ -10,13 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from .described_liquid import number_of
-from .fields import AXES, PLANES, STICK_WEIGHT
-from .recording import JUMPS, Recording, steps, torn_values
+from .limits import ABOVE_0, BELOW_1, INF, Limits, number_of
+from .recording import AXES, JUMPS, PLANES, STICK_WEIGHT, Recording, steps, torn_values
 from .start import above_liquid, noise_of
-
-INF, ABOVE_0, BELOW_1 = np.inf, float(np.finfo(float).tiny), float(np.nextafter(1.0, 0.0))
 
 LIMITS = {
     "cup_radius": (5e-3, 0.25, "m"),
@@ -39,6 +35,10 @@ MIN_SEEN = 0.5
 """Smallest share of a plane's samples in which the stick must have been seen."""
 MIN_FROZEN_TIME = 0.25
 """Time of equal numbers that is no coincidence of a coarse scale [s]."""
+MAX_STAIRS = 0.05
+"""Usual time between two updates of a value that is held between them [s]: half of it is a delay."""
+MIN_LEVELS_SHARE = 0.5
+"""Of different values among those that are held: a coarse scale shows fewer again and again."""
 MIN_SPEED_SHARE = 0.2
 """Of the gripper's usual speed, above which it moves."""
 MAX_NOISE_SHARE = 0.8
@@ -75,45 +75,41 @@ class Rule(NamedTuple):
     unit: str
     fix: str
 
-    def check(self, recording: Recording) -> None:
-        """Raise `InputError` outside of the limits."""
+    def check(self, recording: Recording, hint: str) -> None:
+        """Raise `InputError` outside of the limits; `hint` ends the remedy."""
+        limits = Limits(self.quantity, self.least, self.most, self.unit, f"{self.fix}{hint}")
         for field in self.fields:
             measured = self.measure(recording, field)
             value, note = measured if isinstance(measured, tuple) else (measured, "")
-            if self.least <= value <= self.most:
-                continue
             attribute = "attribute " if field in LIMITS else ""
-            raise InputError(
-                f"{self.quantity} = {value:.6g} {self.unit}".strip(" =")
-                + f"{note}, {_span(self.least, self.most)} {self.unit}".rstrip()
-                + " allowed",
-                where=f"{recording.path}: {attribute}{field}",
-                fix=self.fix,
-            )
+            limits.check(value, f"{recording.path}: {attribute}{field}", note)
 
 
-def check_values(recording: Recording) -> None:
-    """Raise `InputError` at the first value that no simulator could use."""
+def check_values(recording: Recording, hint: str = "") -> None:
+    """Raise `InputError` at the first value that no simulator could use.
+
+    Args:
+        recording: The recording.
+        hint: What else may help, at the end of each remedy.
+    """
     sizes = [
         Rule((name,), "", _size, least, most, unit, f"give a number in {unit}, or measure it again")
         for name, (least, most, unit) in LIMITS.items()
         if name in recording.attrs or name not in STICK_WEIGHT
     ]
     for rule in (*sizes, *RULES):
-        rule.check(recording)
+        rule.check(recording, hint)
+
+
+def check_times(recording: Recording) -> None:
+    """Raise `InputError` unless the times increase."""
+    for rule in TIMES:
+        rule.check(recording, "")
 
 
 def _size(recording: Recording, field: str) -> Measured:
     """An attribute, which must be a number."""
     return number_of(recording.attrs.get(field), f"{recording.path}: attribute {field}")
-
-
-def _span(least: float, most: float) -> str:
-    if least == ABOVE_0:
-        return f"above 0 to {most:g}"
-    if not np.isfinite(most):
-        return f"at least {least:g}"
-    return f"{least:g}" if least == most else f"{least:g} to {most:g}"
 
 
 def longest_gap(time: NDArray, seen: NDArray[np.bool_]) -> tuple[float, float]:
@@ -243,6 +239,26 @@ def _frozen_share(recording: Recording, field: str) -> Measured:
     return share, note
 
 
+def _stairs(recording: Recording, field: str) -> Measured:
+    """Usual time between updates of what is held from sample to sample; 0 if nothing is [s].
+
+    The levels of a stair differ from each other, while the steps of a coarse scale are few.
+    """
+    values = recording.values(field) if field in PLANES else recording.gripper.position
+    values = values.reshape(len(recording.time), -1)
+    seen = np.isfinite(values).all(axis=1)
+    time, values = recording.time[seen], values[seen]
+    way, step = steps(time, values)
+    updates = np.flatnonzero(way > MIN_SPEED_SHARE * float(np.quantile(way / step, 0.9)) * step)
+    if len(updates) < 2:
+        return 0.0
+    between, usual = float(np.median(np.diff(time[updates]))), float(np.median(step))
+    levels = len(np.unique(values[updates], axis=0))
+    if between < 1.5 * usual or levels < MIN_LEVELS_SHARE * len(updates):
+        return 0.0
+    return between, f" (updates at {1.0 / between:.3g} Hz in samples at {1.0 / usual:.3g} Hz)"
+
+
 def _noise_deg(recording: Recording, field: str) -> Measured:
     values = recording.values(field)
     noise = noise_of(values)
@@ -315,11 +331,12 @@ def _buoyancy(recording: Recording, field: str) -> Measured:
 
 
 TIME, WEIGHT = ("time",), (" or ".join(STICK_WEIGHT),)
-XY, ALL, TIP = ("x, y",), (", ".join(JUMPS),), ("z, stick_length",)
+PATH, XY, ALL, TIP = (", ".join(AXES),), ("x, y",), (", ".join(JUMPS),), ("z, stick_length",)
 LEANS = (", ".join(PLANES),)
 MEASURE, AGAIN = "measure both again, in m", "look at what was measured, and record again"
 MASS = "give the mass in kg, or measure the stick again"
 STILL = "mark samples of a camera that stood still by NaN, or record again"
+HELD = "mark samples between updates by NaN, or give each its own value"
 CLOCKS = "shift the stamps of one log onto the other's clock"
 DECIMALS = "write times with more decimals, or import a table with `rate_hz` in its map"
 ANGLE = "give it in rad from the downward vertical, and NaN where the stick was not seen"
@@ -330,10 +347,13 @@ AXIS = "shift x and y to the cup's axis, or correct cup_radius"
 CUT = "cut the recording before it"
 FROZEN = "of one number while the gripper moves"
 
-RULES = (
+TIMES = (
     Rule(TIME, "number of samples", lambda r, _: len(r.time), 10, INF, "", "record more"),
     Rule(TIME, "repeated stamps", _repeated, 0, 0, "", DECIMALS),
     Rule(TIME, "shortest step", _shortest_step, 1e-9, INF, "s", "sort the samples by time"),
+)
+RULES = (
+    *TIMES,
     Rule(TIME, "usual step", _usual_step, 0, 1, "s", "give times in s"),
     Rule(("stick_mass",), "density", _made_density, 0, 25e3, "kg/m3", MASS),
     Rule(tuple(OUTER), "part", _part, 0, BELOW_1, "", MEASURE),
@@ -349,6 +369,7 @@ RULES = (
     Rule(ALL, "samples that jump out and back", _torn, 0, 0, "", AGAIN),
     Rule(PLANES, f"longest time {FROZEN}", _frozen_time, 0, 1, "s", STILL),
     Rule(PLANES, f"share of the time {FROZEN}", _frozen_share, 0, 0.25, "", STILL),
+    Rule((*PATH, *PLANES), "stairs", _stairs, 0, MAX_STAIRS, "s", HELD),
     Rule(PLANES, "noise from sample to sample", _noise_deg, 0, 3, "deg", AGAIN),
     Rule(PLANES, "share of samples beyond the cup's rim", _beyond_rim, 0, 0.02, "", RIM),
     Rule(LEANS, "largest inclination", _lean_deg, 0.2, INF, "deg", ONCE),

@@ -3,7 +3,9 @@
 A cup is round, and a stick hangs freely. So the inclination xz + i yz, as a complex number,
 answers the gripper's x + i y by one real response in time, the same in all directions. A frame
 that is turned multiplies it by a phase. The wrong sign of one plane, or planes that are
-exchanged, conjugate it. Least squares find both, without any simulator.
+exchanged, conjugate it. Least squares find both, without any simulator. So they do what one camera
+alone has suffered, or the stamps of both: each such fault is tried at all of its sizes, and found
+where it leaves much less of the inclination unexplained than any frame does.
 """
 
 from collections.abc import Iterable, Iterator
@@ -12,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .fields import PLANES
-from .recording import Recording
+from .recording import PLANES, Recording
 
 DELAYS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45)
 """At which the inclination may follow the gripper [s]."""
@@ -41,6 +42,20 @@ MAX_TURN_DEG = 15.0
 MAX_TURN_ERRORS = 3.0
 """Standard errors by which a turn must differ from none."""
 
+MAX_FAULT_RATIO = 0.6
+"""Residual of a fault of one plane, or of the stamps, over that of the best frame."""
+
+FAULT_TIME = 12.0
+"""Time from the start that faults of planes and stamps are sought in [s]."""
+
+LATE = np.arange(0.05, 0.61, 0.05)
+"""Delays of one plane that are tried [s]."""
+
+TURNED = np.radians(np.r_[-90:-MAX_TURN_DEG:5, 90:MAX_TURN_DEG:-5])
+"""Turns of one plane that are tried [rad]."""
+
+RATES = 1.02 ** np.r_[-35:-1, 2:36]
+"""True rates of the pictures over those of their stamps that are tried."""
 
 CAUSES = {
     (False, 2): f"the signs (`flip`) of {' and '.join(PLANES)}, or of x and y, are wrong",
@@ -69,13 +84,9 @@ class FrameRotation(NamedTuple):
 
 def found_turn(recording: Recording) -> FrameRotation | None:
     """The turn of a recording's frame; None where its path does not tell it."""
-    path = recording.gripper.position[:, :2]
-    inclination = recording.inclination @ (1.0, 1j)
-    seen = np.isfinite(inclination)
-    travel = (np.nanmax(path, axis=0) - np.nanmin(path, axis=0)).max()
-    if travel < MIN_TRAVEL or seen.sum() < N_BLOCKS * MIN_SAMPLES_PER_BLOCK:
+    if (seen := _both_seen(recording)) is None:
         return None
-    delayed, inclination = _delayed(recording)[seen], inclination[seen]
+    delayed, inclination = seen
     straight, mirrored = _fit(inclination, delayed), _fit(inclination.conj(), delayed)
     is_mirrored = mirrored.residual < MAX_RESIDUAL_RATIO * straight.residual
     best = mirrored if is_mirrored else straight
@@ -107,6 +118,9 @@ def named_faults(recordings: Iterable[Recording]) -> tuple[str, ...]:
 
 def frame_faults(recording: Recording) -> Iterator[str]:
     """What is wrong with the frame of a recording; nothing where none is found."""
+    if (fault := _camera_fault(recording)) is not None:
+        yield fault
+        return
     turn = found_turn(recording)
     if turn is None:
         return
@@ -125,14 +139,86 @@ def frame_faults(recording: Recording) -> Iterator[str]:
     )
 
 
-def _delayed(recording: Recording) -> NDArray[np.complex128]:
-    """The gripper's x + i y at each sample, and each delay before it, shape (T, delays)."""
-    time, way = recording.time, 0.0
+def _both_seen(
+    recording: Recording,
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128]] | None:
+    """Delayed positions and inclination where both planes are seen; None of too few or no stir."""
+    path = recording.gripper.position[:, :2]
+    inclination = recording.inclination @ (1.0, 1j)
+    seen = np.isfinite(inclination)
+    travel = (np.nanmax(path, axis=0) - np.nanmin(path, axis=0)).max()
+    if travel < MIN_TRAVEL or seen.sum() < N_BLOCKS * MIN_SAMPLES_PER_BLOCK:
+        return None
+    return _delayed(recording, recording.time)[seen], inclination[seen]
+
+
+def _delayed(recording: Recording, time: NDArray) -> NDArray[np.complex128]:
+    """The gripper's x + i y at each of the times (T,) and each delay before, (T, delays)."""
+    way = 0.0
     for axis, factor in zip(recording.gripper.position.T[:2], (1.0, 1j), strict=True):
         known = np.isfinite(axis)
-        before = [np.interp(time - delay, time[known], axis[known]) for delay in DELAYS]
+        before = [np.interp(time - delay, recording.time[known], axis[known]) for delay in DELAYS]
         way = way + factor * np.stack(before, axis=-1)
     return np.asarray(way)
+
+
+def _camera_fault(recording: Recording) -> str | None:
+    """What one camera alone, or the stamps of both, have suffered; None where nothing is found."""
+    recording = recording.first(
+        int(np.searchsorted(recording.time, recording.time[0] + FAULT_TIME))
+    )
+    if (seen := _both_seen(recording)) is None:
+        return None
+    delayed, inclination = seen
+    frames = [_fit(one, delayed) for one in (inclination, inclination.conj())]
+    left, fault = min(_camera_faults(recording), key=lambda one: one[0])
+    least = 1.0 - max(frame.followed for frame in frames)
+    return fault if left < MAX_FAULT_RATIO * max(least, MIN_RESIDUAL_SHARE) else None
+
+
+def _camera_faults(recording: Recording) -> Iterator[tuple[float, str]]:
+    """Share of the inclination's variance that each fault leaves, and its description."""
+    time, usual = recording.time, 1.0 / float(np.median(np.diff(recording.time)))
+    now = _delayed(recording, time)
+    still = [now.real, now.imag]
+    for late in LATE:
+        before = _delayed(recording, time - late)
+        for plane, way in enumerate((before.real, before.imag)):
+            name, other = PLANES[plane], PLANES[1 - plane]
+            text = f"{name} comes {late:.2g} s later than {other}: shift its stamps, or the other's"
+            yield _left(recording, _with(still, plane, way)), text
+    for turn in TURNED:
+        around = np.exp(1j * turn) * now
+        for plane, way in enumerate((around.real, around.imag)):
+            text = (
+                f"{PLANES[plane]} alone is turned by {np.degrees(turn):.0f} deg, which no turn of "
+                "x and y mends: correct where its camera stands, or calibrate it again"
+            )
+            yield _left(recording, _with(still, plane, way)), text
+    for rate in RATES:
+        way = _delayed(recording, time[0] + (time - time[0]) / rate)
+        text = (
+            f"the inclination follows as in pictures taken at {usual * rate:.3g} Hz, and is given "
+            f"at {usual:.3g} Hz: stamp each picture with the time at which it was taken"
+        )
+        yield _left(recording, [way.real, way.imag]), text
+
+
+def _with(designs: list[NDArray], plane: int, design: NDArray) -> list[NDArray]:
+    """The designs of both planes, (T, delays) each, with another one of one plane."""
+    return [design if at == plane else one for at, one in enumerate(designs)]
+
+
+def _left(recording: Recording, designs: list[NDArray]) -> float:
+    """Share of both planes' variance that one response to their designs (T, delays) leaves."""
+    seen = [np.isfinite(plane) for plane in recording.inclination.T]
+    parts = zip(designs, recording.inclination.T, seen, strict=True)
+    design, angle = (
+        np.concatenate([one[at] - one[at].mean(axis=0) for one, at in part])
+        for part in zip(*(((way, at), (angle, at)) for way, angle, at in parts), strict=True)
+    )
+    left = angle - design @ np.linalg.lstsq(design, angle, rcond=None)[0]
+    return float(left @ left) / max(float(angle @ angle), np.finfo(float).tiny)
 
 
 class _RotationFit(NamedTuple):

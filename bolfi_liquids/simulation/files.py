@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from ..errors import Argument, InputError
 from ..files import given_path, new_file
 from ..inputs.described_liquid import Described
-from ..inputs.fields import PLANES
-from ..inputs.recording import Recording, along_path, recording_dataset
+from ..inputs.recording import PLANES, Recording, along_path, recording_dataset
 from ..movie.file import PICTURE_RATE, check_movie, write_movie
 from ..pouring.spillage import FRACTIONS
 from ..progress import progress_bar

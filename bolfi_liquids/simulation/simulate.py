@@ -12,17 +12,11 @@ from ..errors import Argument, InputError
 from ..files import write_netcdf
 from ..inputs.bundled import bundled_recording
 from ..inputs.cups import cups_of
-from ..inputs.described_liquid import (
-    COHESION,
-    DENSITY,
-    VISCOSITY,
-    check_effects,
-    number_of,
-)
-from ..inputs.fields import LENGTHS, STICK_WEIGHT
+from ..inputs.described_liquid import COHESION, DENSITY, VISCOSITY, check_effects
+from ..inputs.limits import number_of
 from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import check_distance, check_rate
-from ..inputs.recording import Recording, Trajectory
+from ..inputs.recording import LENGTHS, STICK_WEIGHT, Recording, Trajectory
 from ..run.compute import open_compute
 from ..simulators import RATE, BatchOf, PourSimulator, StirSimulator
 from .batch import batch_of, simulated

@@ -9,7 +9,8 @@ from bolfi_liquids.inference.bolfi import MOST_SIMULATIONS
 from xarray import DataArray
 
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.inputs.described_liquid import check_effects, number_of
+from bolfi_liquids.inputs.described_liquid import check_effects
+from bolfi_liquids.inputs.limits import number_of
 from bolfi_liquids.inputs.settings import (
     MAX_SIMULATIONS,
     MIN_SIMULATIONS,
