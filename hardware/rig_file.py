@@ -1,7 +1,7 @@
 """Reading a rig.toml, and the one that comes with the package."""
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
 from importlib.resources import as_file, files
 from pathlib import Path

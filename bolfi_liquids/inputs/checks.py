@@ -36,7 +36,7 @@ MIN_SEEN = 0.5
 MIN_FROZEN_TIME = 0.25
 """Time of equal numbers that is no coincidence of a coarse scale [s]."""
 MAX_STAIRS = 0.05
-"""Usual time between two updates of a value that is held between them [s]: half of it is a delay."""
+"""Usual time between updates of a value that is held in between [s]: half of it is a delay."""
 MIN_LEVELS_SHARE = 0.5
 """Of different values among those that are held: a coarse scale shows fewer again and again."""
 MIN_SPEED_SHARE = 0.2

@@ -45,6 +45,9 @@ MAX_TURN_ERRORS = 3.0
 MAX_FAULT_RATIO = 0.6
 """Residual of a fault of one plane, or of the stamps, over that of the best frame."""
 
+MIN_FAULT_SHARE = 0.02
+"""Of the inclination's variance, which the best frame leaves: below, there is no fault to find."""
+
 FAULT_TIME = 12.0
 """Time from the start that faults of planes and stamps are sought in [s]."""
 
@@ -173,7 +176,7 @@ def _camera_fault(recording: Recording) -> str | None:
     frames = [_fit(one, delayed) for one in (inclination, inclination.conj())]
     left, fault = min(_camera_faults(recording), key=lambda one: one[0])
     least = 1.0 - max(frame.followed for frame in frames)
-    return fault if left < MAX_FAULT_RATIO * max(least, MIN_RESIDUAL_SHARE) else None
+    return fault if least > MIN_FAULT_SHARE and left < MAX_FAULT_RATIO * least else None
 
 
 def _camera_faults(recording: Recording) -> Iterator[tuple[float, str]]:

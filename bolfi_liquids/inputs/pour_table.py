@@ -32,7 +32,7 @@ ACTIONS = {
 ANGULAR_VELOCITY, DISTANCE = ACTIONS
 AMOUNTS = ("spilled", "received", "retained")
 LIQUID = "liquid"
-MAX_DRIFT = 0.01
+MAX_DRIFT = 0.005
 """Of a pour's amount, by which a scale may have drifted below 0, which then counts as 0."""
 MAX_TIMES_BEYOND = 4.0  # that a pour may be faster or slower than the cups' range
 MAX_TIMES_TOTAL = 10.0  # that a pour may be more or less than the usual one of its table

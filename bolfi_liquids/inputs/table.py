@@ -115,6 +115,7 @@ class Table:
             InputError: There is no such column, or a cell holds something else.
         """
         numbers = np.full(len(self.lines), np.nan)
+        empty = "" if complete else ", or leave it empty where a value is missing"
         for at, cell in enumerate(self.column(name)):
             if cell.lower() in MISSING and not complete:
                 continue
@@ -124,10 +125,9 @@ class Table:
                 raise InputError(
                     str(err),
                     where=self.where(self.lines[at], name),
-                    fix="correct the cell"
-                    + ("" if complete else ", or leave it empty where a value is missing")
-                    + f"; this table has {self.decimal!r} as its decimal sign (a decimal comma needs ';' "
-                    f"between the cells), and thousands are not set apart{remark}",
+                    fix=f"correct the cell{empty}; this table has {self.decimal!r} as its decimal "
+                    "sign (a decimal comma needs ';' between the cells), and thousands are not set "
+                    f"apart{remark}",
                 ) from None
         return numbers
 
