@@ -85,7 +85,7 @@ def field_faults(err: ValidationError, model: type[BaseModel]) -> Iterator[RigFa
         name, given = ".".join(map(str, one["loc"])), one["input"]
         what = one["msg"].removeprefix("Value error, ")
         if one["type"] == "missing":
-            what = "is missing"
+            what = "is required, but missing"
         elif one["type"] == "extra_forbidden":
             *way, unknown = one["loc"]
             known = _section(model, way).model_fields
