@@ -14,17 +14,18 @@ from .limits import ABOVE_0, BELOW_1, INF, Limits, number_of
 from .recording import AXES, JUMPS, PLANES, STICK_WEIGHT, Recording, steps, torn_values
 from .start import above_liquid, noise_of
 
-LIMITS = {
-    "cup_radius": (5e-3, 0.25, "m"),
-    "cup_height": (5e-3, 0.5, "m"),
-    "fill": (1e-3, 0.5, "m"),
-    "stick_radius": (2e-4, 0.05, "m"),
-    "stick_length": (0.02, 1.0, "m"),
-    "liquid_density": (50.0, 20_000.0, "kg/m3"),
-    "stick_density": (50.0, 20_000.0, "kg/m3"),
-    "stick_mass": (ABOVE_0, 2.0, "kg"),
+REMEASURE = "give a number in SI units, or measure it again"
+SIZES = {
+    "cup_radius": Limits("", 5e-3, 0.25, "m", REMEASURE),
+    "cup_height": Limits("", 5e-3, 0.5, "m", REMEASURE),
+    "fill": Limits("", 1e-3, 0.5, "m", REMEASURE),
+    "stick_radius": Limits("", 2e-4, 0.05, "m", REMEASURE),
+    "stick_length": Limits("", 0.02, 1.0, "m", REMEASURE),
+    "liquid_density": Limits("", 50.0, 20_000.0, "kg/m3", REMEASURE),
+    "stick_density": Limits("", 50.0, 20_000.0, "kg/m3", REMEASURE),
+    "stick_mass": Limits("", ABOVE_0, 2.0, "kg", REMEASURE),
 }
-"""Smallest and largest value of each attribute, and its unit."""
+"""Limits of each attribute."""
 
 OUTER = {"fill": "cup_height", "stick_radius": "cup_radius"}
 """Sizes that must be smaller than another one."""
@@ -55,33 +56,25 @@ Measured = float | tuple[float, str]
 
 
 class Rule(NamedTuple):
-    """A quantity of a recording, its limits, and what to do beyond them.
+    """A quantity of a recording, and its limits.
 
     Attributes:
         fields: Variables or attributes that it holds for, one by one.
-        quantity: Its name.
         measure: Its value in a recording for a field; NaN lies outside of all limits.
-        least: The smallest value allowed.
-        most: The largest value allowed.
-        unit: Of value and limits.
-        fix: The remedy.
+        limits: With the remedy.
     """
 
     fields: tuple[str, ...]
-    quantity: str
     measure: Callable[[Recording, str], Measured]
-    least: float
-    most: float
-    unit: str
-    fix: str
+    limits: Limits
 
-    def check(self, recording: Recording, hint: str) -> None:
+    def check(self, recording: Recording, hint: str = "") -> None:
         """Raise `InputError` outside of the limits; `hint` ends the remedy."""
-        limits = Limits(self.quantity, self.least, self.most, self.unit, f"{self.fix}{hint}")
+        limits = self.limits._replace(fix=f"{self.limits.fix}{hint}")
         for field in self.fields:
             measured = self.measure(recording, field)
             value, note = measured if isinstance(measured, tuple) else (measured, "")
-            attribute = "attribute " if field in LIMITS else ""
+            attribute = "attribute " if field in SIZES else ""
             limits.check(value, f"{recording.path}: {attribute}{field}", note)
 
 
@@ -92,19 +85,17 @@ def check_values(recording: Recording, hint: str = "") -> None:
         recording: The recording.
         hint: What else may help, at the end of each remedy.
     """
-    sizes = [
-        Rule((name,), "", _size, least, most, unit, f"give a number in {unit}, or measure it again")
-        for name, (least, most, unit) in LIMITS.items()
-        if name in recording.attrs or name not in STICK_WEIGHT
-    ]
-    for rule in (*sizes, *RULES):
+    for name, limits in SIZES.items():
+        if name in recording.attrs or name not in STICK_WEIGHT:
+            Rule((name,), _size, limits).check(recording, hint)
+    for rule in RULES:
         rule.check(recording, hint)
 
 
 def check_times(recording: Recording) -> None:
     """Raise `InputError` unless the times increase."""
     for rule in TIMES:
-        rule.check(recording, "")
+        rule.check(recording)
 
 
 def _size(recording: Recording, field: str) -> Measured:
@@ -335,6 +326,7 @@ PATH, XY, ALL, TIP = (", ".join(AXES),), ("x, y",), (", ".join(JUMPS),), ("z, st
 LEANS = (", ".join(PLANES),)
 MEASURE, AGAIN = "measure both again, in m", "look at what was measured, and record again"
 MASS = "give the mass in kg, or measure the stick again"
+ORDER = "sort the samples by time; where a clock was set back, add what it lost"
 STILL = "mark samples of a camera that stood still by NaN, or record again"
 HELD = "mark samples between updates by NaN, or give each its own value"
 CLOCKS = "shift the stamps of one log onto the other's clock"
@@ -348,34 +340,42 @@ CUT = "cut the recording before it"
 FROZEN = "of one number while the gripper moves"
 
 TIMES = (
-    Rule(TIME, "number of samples", lambda r, _: len(r.time), 10, INF, "", "record more"),
-    Rule(TIME, "repeated stamps", _repeated, 0, 0, "", DECIMALS),
-    Rule(TIME, "shortest step", _shortest_step, 1e-9, INF, "s", "sort the samples by time"),
+    Rule(TIME, lambda r, _: len(r.time), Limits("number of samples", 10, INF, "", "record more")),
+    Rule(TIME, _repeated, Limits("repeated stamps", 0, 0, "", DECIMALS)),
+    Rule(TIME, _shortest_step, Limits("shortest step", 1e-9, INF, "s", ORDER)),
 )
 RULES = (
     *TIMES,
-    Rule(TIME, "usual step", _usual_step, 0, 1, "s", "give times in s"),
-    Rule(("stick_mass",), "density", _made_density, 0, 25e3, "kg/m3", MASS),
-    Rule(tuple(OUTER), "part", _part, 0, BELOW_1, "", MEASURE),
-    Rule(TIME, "difference of arm's and cameras' clocks", _clock_difference, 0, 0, "s", CLOCKS),
-    Rule(AXES, "largest position", _largest, 0, 2, "m", "give positions in m"),
-    Rule(AXES, "longest time without a position", _gap, 0, MAX_GRIPPER_GAP, "s", CUT),
-    Rule(TIME, "usual speed", _usual_speed, 0, 1, "m/s", "give times in s and positions in m"),
+    Rule(TIME, _usual_step, Limits("usual step", 0, 1, "s", "give times in s")),
+    Rule(("stick_mass",), _made_density, Limits("density", 0, 25e3, "kg/m3", MASS)),
+    Rule(tuple(OUTER), _part, Limits("part", 0, BELOW_1, "", MEASURE)),
+    Rule(TIME, _clock_difference, Limits("difference of the clocks", 0, 0, "s", CLOCKS)),
+    Rule(AXES, _largest, Limits("largest position", 0, 2, "m", "give positions in m")),
+    Rule(AXES, _gap, Limits("longest time without a position", 0, MAX_GRIPPER_GAP, "s", CUT)),
     Rule(
-        PLANES, "share of samples with the stick in sight", _seen, MIN_SEEN, 1, "", "record again"
+        TIME, _usual_speed, Limits("usual speed", 0, 1, "m/s", "give times in s and positions in m")
     ),
-    Rule(PLANES, "longest time without an inclination", _gap, 0, 0.5, "s", CUT),
-    Rule(PLANES, "largest inclination", _largest, 0, np.pi / 2, "rad", ANGLE),
-    Rule(ALL, "samples that jump out and back", _torn, 0, 0, "", AGAIN),
-    Rule(PLANES, f"longest time {FROZEN}", _frozen_time, 0, 1, "s", STILL),
-    Rule(PLANES, f"share of the time {FROZEN}", _frozen_share, 0, 0.25, "", STILL),
-    Rule((*PATH, *PLANES), "stairs", _stairs, 0, MAX_STAIRS, "s", HELD),
-    Rule(PLANES, "noise from sample to sample", _noise_deg, 0, 3, "deg", AGAIN),
-    Rule(PLANES, "share of samples beyond the cup's rim", _beyond_rim, 0, 0.02, "", RIM),
-    Rule(LEANS, "largest inclination", _lean_deg, 0.2, INF, "deg", ONCE),
-    Rule(XY, "room between stick and wall", _room, 0, INF, "m", AXIS),
-    Rule(XY, "travel", _travel, 1e-3, INF, "m", "record a stir, in m"),
-    Rule(TIP, "depth of the stick in the liquid", _depth, 1e-6, INF, "m", FLOOR),
-    Rule(TIP, "height of the tip above the floor", _above_floor, 0, INF, "m", FLOOR),
-    Rule(WEIGHT, "buoyancy / weight", _buoyancy, 0, BELOW_1, "", "weigh the stick; it must hang"),
+    Rule(
+        PLANES,
+        _seen,
+        Limits("share of samples with the stick in sight", MIN_SEEN, 1, "", "record again"),
+    ),
+    Rule(PLANES, _gap, Limits("longest time without an inclination", 0, 0.5, "s", CUT)),
+    Rule(PLANES, _largest, Limits("largest inclination", 0, np.pi / 2, "rad", ANGLE)),
+    Rule(ALL, _torn, Limits("samples that jump out and back", 0, 0, "", AGAIN)),
+    Rule(PLANES, _frozen_time, Limits(f"longest time {FROZEN}", 0, 1, "s", STILL)),
+    Rule(PLANES, _frozen_share, Limits(f"share of the time {FROZEN}", 0, 0.25, "", STILL)),
+    Rule((*PATH, *PLANES), _stairs, Limits("stairs", 0, MAX_STAIRS, "s", HELD)),
+    Rule(PLANES, _noise_deg, Limits("noise from sample to sample", 0, 3, "deg", AGAIN)),
+    Rule(PLANES, _beyond_rim, Limits("share of samples beyond the cup's rim", 0, 0.02, "", RIM)),
+    Rule(LEANS, _lean_deg, Limits("largest inclination", 0.2, INF, "deg", ONCE)),
+    Rule(XY, _room, Limits("room between stick and wall", 0, INF, "m", AXIS)),
+    Rule(XY, _travel, Limits("travel", 1e-3, INF, "m", "record a stir, in m")),
+    Rule(TIP, _depth, Limits("depth of the stick in the liquid", 1e-6, INF, "m", FLOOR)),
+    Rule(TIP, _above_floor, Limits("height of the tip above the floor", 0, INF, "m", FLOOR)),
+    Rule(
+        WEIGHT,
+        _buoyancy,
+        Limits("buoyancy / weight", 0, BELOW_1, "", "weigh the stick; it must hang"),
+    ),
 )
