@@ -39,15 +39,15 @@ class Within:
 
     def _checked(self, value: float) -> float:
         if not self.low <= value <= self.high:
-            ends = f"{self.low:.4g} to {self.high:.4g} {self.unit}"
-            raise ValueError(f"{value:g} {self.unit} is not within {ends}")
+            ends = f"{self.low:.3g} to {self.high:.5g} {self.unit}"
+            raise ValueError(f"it must be {ends}, got {value:g}")
         return value
 
 
 def _wets(angle: float) -> float:
     """A rule for contact angles [deg]: a small one other than 0 is in radians."""
     if 0.0 < angle <= np.pi:
-        raise ValueError(f"{angle:g} deg is not 0 or above {np.pi:.2f} deg; convert radians to deg")
+        raise ValueError(f"it must be 0 or above {np.pi:.2f} deg, got {angle:g}; no radians")
     return angle
 
 

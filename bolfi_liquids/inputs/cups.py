@@ -30,7 +30,7 @@ def cups_of(given: "Cups | str | Path | None") -> "Cups":
 
     if given is None:
         return bundled_cups()
-    cups = opened(given, Cups, open_cups, Argument("cups"), "a cups.toml")
+    cups = opened(given, Cups, open_cups, Argument("cups"), "pair of cups")
     return validated(cups.model_dump(), Cups, "cups", FIX)  # copies may hold what no file may
 
 

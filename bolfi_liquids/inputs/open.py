@@ -84,7 +84,7 @@ def open_recordings(
     """
     if isinstance(sources, Source) or not isinstance(sources, Iterable):
         sources = [sources]
-    return [opened(one, Recording, open_recording, option, "a NetCDF file") for one in sources]
+    return [opened(one, Recording, open_recording, option, "recording") for one in sources]
 
 
 def read_fields(content: bytes, path: Path) -> "Dataset":

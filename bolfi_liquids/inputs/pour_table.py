@@ -157,7 +157,7 @@ def table_of(given: Pours | None, where: str) -> PourTable | None:
     Raises:
         InputError: Something else was given, or the file cannot be used.
     """
-    return None if given is None else opened(given, PourTable, open_pours, where, "a table")
+    return None if given is None else opened(given, PourTable, open_pours, where, "table of pours")
 
 
 def table_and_cups(

@@ -21,4 +21,4 @@ def rig_of(given: "Rig | str | Path | None") -> "Rig":
 
     if given is None:
         return bundled_rig()
-    return checked_rig(opened(given, Rig, open_rig, "rig", "a rig.toml"))
+    return checked_rig(opened(given, Rig, open_rig, "rig", "rig"))

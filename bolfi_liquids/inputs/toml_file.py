@@ -16,7 +16,7 @@ def opened[Kind](
     kind: type[Kind],
     open_file: Callable[[str | Path], Kind],
     where: str,
-    file: str,
+    noun: str,
 ) -> Kind:
     """A value as it is, or what a file holds.
 
@@ -25,7 +25,7 @@ def opened[Kind](
         kind: Of the value.
         open_file: Reads such a file.
         where: The argument, for a refusal.
-        file: Description of such a file, likewise.
+        noun: What the value is, likewise.
 
     Raises:
         InputError: It is something else, or the file cannot be used.
@@ -34,8 +34,8 @@ def opened[Kind](
         return given
     if isinstance(given, str | Path):
         return open_file(given)
-    fix = f"give the path of {file}, or an object {kind.__name__}"
-    raise InputError(f"{given!r:.80} is no {kind.__name__.lower()}", where=where, fix=fix)
+    fix = f"give the path of its file, or a value of {kind.__name__}"
+    raise InputError(f"{given!r:.80} is no {noun}", where=where, fix=fix)
 
 
 def read_toml[Model: BaseModel](path: str | Path, model: type[Model], fix: str) -> Model:
