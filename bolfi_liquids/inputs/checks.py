@@ -119,6 +119,11 @@ def longest_gap(time: NDArray, seen: NDArray[np.bool_]) -> tuple[float, float]:
     return float(gaps[at]), float(edges[at])
 
 
+def _missing_times(recording: Recording, field: str) -> Measured:
+    missing = np.isnan(recording.time)
+    return int(missing.sum()), f" (the first is of sample {int(missing.argmax())})"
+
+
 def _repeated(recording: Recording, field: str) -> Measured:
     stamps, counts = np.unique(recording.time, return_counts=True)
     count, distinct = len(recording.time), len(stamps)
@@ -200,6 +205,15 @@ def _torn(recording: Recording, field: str) -> Measured:
     return int(torn.sum()), (
         f" of {len(torn)}, the first is sample {first} at {recording.time[first]:.13g} s"
     )
+
+
+def _jump(recording: Recording, field: str) -> Measured:
+    """Greatest speed from one sample to the next, of those further apart than a torn value."""
+    seen = np.flatnonzero(np.isfinite(recording.gripper.position).all(axis=1))
+    way, step = steps(recording.time[seen], recording.gripper.position[seen])
+    speed = np.where(way > JUMPS["x"], way / step, 0.0)
+    at = int(speed.argmax())
+    return float(speed[at]), f" over {way[at]:.3g} m after sample {seen[at]}"
 
 
 def _frozen(recording: Recording, field: str) -> tuple[float, float, str]:
@@ -327,6 +341,7 @@ LEANS = (", ".join(PLANES),)
 MEASURE, AGAIN = "measure both again, in m", "look at what was measured, and record again"
 MASS = "give the mass in kg, or measure the stick again"
 ORDER = "sort the samples by time; where a clock was set back, add what it lost"
+STAMP = "give each sample its time, or leave out its row"
 STILL = "mark samples of a camera that stood still by NaN, or record again"
 HELD = "mark samples between updates by NaN, or give each its own value"
 CLOCKS = "shift the stamps of one log onto the other's clock"
@@ -341,6 +356,7 @@ FROZEN = "of one number while the gripper moves"
 
 TIMES = (
     Rule(TIME, lambda r, _: len(r.time), Limits("number of samples", 10, INF, "", "record more")),
+    Rule(TIME, _missing_times, Limits("missing stamps", 0, 0, "", STAMP)),
     Rule(TIME, _repeated, Limits("repeated stamps", 0, 0, "", DECIMALS)),
     Rule(TIME, _shortest_step, Limits("shortest step", 1e-9, INF, "s", ORDER)),
 )
@@ -363,6 +379,7 @@ RULES = (
     Rule(PLANES, _gap, Limits("longest time without an inclination", 0, 0.5, "s", CUT)),
     Rule(PLANES, _largest, Limits("largest inclination", 0, np.pi / 2, "rad", ANGLE)),
     Rule(ALL, _torn, Limits("samples that jump out and back", 0, 0, "", AGAIN)),
+    Rule(PATH, _jump, Limits("speed of a jump", 0, 2.5, "m/s", AGAIN)),
     Rule(PLANES, _frozen_time, Limits(f"longest time {FROZEN}", 0, 1, "s", STILL)),
     Rule(PLANES, _frozen_share, Limits(f"share of the time {FROZEN}", 0, 0.25, "", STILL)),
     Rule((*PATH, *PLANES), _stairs, Limits("stairs", 0, MAX_STAIRS, "s", HELD)),

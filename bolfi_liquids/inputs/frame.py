@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .recording import PLANES, Recording
+from .recording import AXES, PLANES, Recording
 
 DELAYS = np.array([0.0, 0.05, 0.1, 0.2, 0.3, 0.45])
 """At which the inclination may follow the gripper [s]."""
@@ -41,6 +41,7 @@ MAX_TIME = 12.0
 TURNS_DEG = np.arange(-175.0, 181.0, 5.0)
 PLANE_TURNS_DEG = np.r_[-90.0:-MAX_TURN_DEG:5.0, 90.0:MAX_TURN_DEG:-5.0]
 PLANE_DELAYS = np.arange(0.05, 0.61, 0.05)  # s
+SCALES = (10.0, 57.3, 100.0, 1000.0)
 RATES = 1.02 ** np.r_[-35:-1, 2:36]  # true ones of pictures over those of their stamps
 
 CAUSES = {
@@ -135,7 +136,7 @@ def _frame_text(turn: float, mirrored: bool) -> str:
 
 
 def _camera_faults(recording: Recording, path: NDArray) -> Iterator[Explanation]:
-    """One camera alone is late or turned, or the pictures have stamps of another rate."""
+    """One plane is late, turned or in another unit, or pictures have stamps of another rate."""
     time = recording.time
     for plane, other in (PLANES, PLANES[::-1]):
         for late in PLANE_DELAYS:
@@ -147,6 +148,12 @@ def _camera_faults(recording: Recording, path: NDArray) -> Iterator[Explanation]
                 "correct where its camera stands, or calibrate it again"
             )
             yield Explanation(_of_plane(plane, _turned(path, turn), path), text)
+        for scale in (*SCALES, *(1.0 / scale for scale in SCALES)):
+            text = (
+                f"{plane} over {AXES[PLANES.index(plane)]} is {scale:.3g} times that of {other}: "
+                "correct the unit of one of them"
+            )
+            yield Explanation(_of_plane(plane, scale * path, path), text)
     usual = 1.0 / float(np.median(np.diff(time)))
     for rate in RATES:
         text = (

@@ -217,7 +217,8 @@ def torn_values(values: NDArray, jump: float) -> NDArray[np.bool_]:
     """Which values lie far from both of their neighbours, while these agree.
 
     Args:
-        values: Shape (T,); NaN where one is missing, which has no neighbour.
+        values: Shape (T,); NaN where one is missing, which is no neighbour. Those of an end are the
+            next two.
         jump: Smallest distance from the neighbours.
 
     Returns:
@@ -225,9 +226,12 @@ def torn_values(values: NDArray, jump: float) -> NDArray[np.bool_]:
     """
     torn = np.zeros(len(values), bool)
     known = np.flatnonzero(np.isfinite(values))
-    before, value, after = (values[known[at : len(known) - 2 + at]] for at in range(3))
+    if len(known) < 3:
+        return torn
+    value = values[known]
+    before, after = np.r_[value[2], value[:-1]], np.r_[value[1:], value[-3]]
     agree = np.abs(after - before) < 0.5 * jump
-    torn[known[1:-1]] = agree & (np.abs(value - before) > jump) & (np.abs(after - value) > jump)
+    torn[known] = agree & (np.abs(value - before) > jump) & (np.abs(after - value) > jump)
     return torn
 
 

@@ -10,6 +10,8 @@ from pydantic import BaseModel, ValidationError
 from ..errors import InputError
 from ..files import existing_file
 
+NO_TOML = "correct that line, or save the file as UTF-8 text"
+
 
 def opened[Kind](
     given: Kind | str | Path,
@@ -53,7 +55,7 @@ def read_toml[Model: BaseModel](path: str | Path, model: type[Model], fix: str) 
     try:
         written = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as err:
-        raise InputError(f"not TOML: {err}", where=str(path), fix="correct that line") from err
+        raise InputError(f"not TOML: {err}", where=str(path), fix=NO_TOML) from err
     return validated(written, model, str(path), fix)
 
 

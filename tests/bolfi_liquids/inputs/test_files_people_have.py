@@ -163,6 +163,18 @@ REFUSED = {
     "dd.mm.yyyy as ISO": (dates("%d.%m.%Y %H:%M:%S.%f"), ISO, ("line 2", "27.11.2025", "2026-")),
     "time of day": (dates("%H:%M:%S.%f"), {}, ("line 2", "13:26:40", "iso")),
     "two clocks": (two_clocks, {}, ("clocks", "3600 s", "shift")),
+    "a stamp left out": (
+        lambda rows, truth: [*rows[:81], ["", *rows[81][1:]], *rows[82:]],
+        {},
+        ("time", "missing stamps = 1", "sample 80"),
+    ),
+    "a jump of two rows": (
+        lambda rows, truth: [
+            [row[0], "0.3", *row[2:]] if at in (81, 82) else row for at, row in enumerate(rows)
+        ],
+        {},
+        ("x, y, z", "jump", "after sample 79"),
+    ),
     "an hour given back": (hour_given_back, {}, ("time", "-3599.97 s", "set back")),
     "many torn": (many_torn, {}, ("10 of 201", "sample 2", "record again")),
     "poses held": (held((1, 2, 3), 6), {}, ("x, y, z", "stairs = 0.2 s", "5 Hz", "NaN")),
@@ -202,19 +214,19 @@ def test_what_a_plane_or_the_stamps_suffered_is_warned_of(made, truth):
 
 
 @pytest.mark.parametrize(
-    ("field", "value"),
-    [("x", "-4.7e226"), ("z", "3e-246"), ("y", "0.1"), ("inclination_xz", "1.05")],
+    ("field", "value", "sample"),
+    [("x", "-4.7e226", 80), ("z", "3e-246", 80), ("inclination_xz", "1.05", 80), ("y", "0.1", 0)],
 )
-def test_one_torn_value_is_named_and_missing(made, truth, tmp_path, field, value):
+def test_one_torn_value_is_named_and_missing(made, truth, tmp_path, field, value, sample):
     rows = rows_of(truth)
-    rows[81][FIELDS.index(field)] = value  # sample 80
+    rows[sample + 1][FIELDS.index(field)] = value
     made(rows)
     found = open_recording(tmp_path / "s.nc")
     (told,) = found.torn
-    assert told.startswith(f"{field}: ") and "sample 80" in told
+    assert told.startswith(f"{field}: ") and f"sample {sample} " in told
     for name in FIELDS:
         expected = truth.values(name).copy()
-        expected[80] = np.nan if name == field else expected[80]
+        expected[sample] = np.nan if name == field else expected[sample]
         np.testing.assert_allclose(found.values(name), expected, atol=1e-12)
 
 

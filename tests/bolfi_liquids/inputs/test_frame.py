@@ -82,6 +82,10 @@ FAULTS = {
     "xz late": (lambda r: at_times(r, 0, r.time - 0.1), "inclination_xz comes 0.1 s later"),
     "yz turned alone": (lambda r: turned_alone(r, 1, -40.0), "inclination_yz alone is turned by -"),
     "xz turned alone": (lambda r: turned_alone(r, 0, 40.0), "inclination_xz alone is turned by "),
+    "degrees twice": (
+        lambda r: replace(r, inclination=r.inclination * (1.0, np.radians(1.0))),
+        "inclination_yz over y is 0.0175 times",
+    ),
     "taken at 25 Hz": (
         lambda r: at_times(r, None, r.time[0] + (r.time - r.time[0]) * 1.2),
         r"taken at 2[45]\.?\d* Hz.* given at 30 Hz",
@@ -92,7 +96,7 @@ FAULTS = {
 @pytest.mark.parametrize(("spoil", "named"), FAULTS.values(), ids=FAULTS)
 def test_each_fault_is_found_in_every_liquid_and_named(spoil, named):
     for liquid in RECORDED_LIQUIDS:
-        recording = shaken(spoil(bundled_recording(liquid)), 0.2)
+        recording = spoil(shaken(bundled_recording(liquid), 0.2))
         (fault,) = frame_faults(recording)
         assert re.search(named, fault), (liquid, fault)
         assert recording_warnings([recording]) == [f"{recording.path}: {fault}"]
