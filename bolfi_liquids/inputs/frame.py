@@ -148,9 +148,9 @@ def _camera_faults(recording: Recording, path: NDArray) -> Iterator[Explanation]
                 "correct where its camera stands, or calibrate it again"
             )
             yield Explanation(_of_plane(plane, _turned(path, turn), path), text)
-        for scale in (*SCALES, *(1.0 / scale for scale in SCALES)):
+        for scale in SCALES:
             text = (
-                f"{plane} over {AXES[PLANES.index(plane)]} is {scale:.3g} times that of {other}: "
+                f"{plane} over {AXES[PLANES.index(plane)]} is {scale:g} times that of {other}: "
                 "correct the unit of one of them"
             )
             yield Explanation(_of_plane(plane, scale * path, path), text)

@@ -84,7 +84,7 @@ FAULTS = {
     "xz turned alone": (lambda r: turned_alone(r, 0, 40.0), "inclination_xz alone is turned by "),
     "degrees twice": (
         lambda r: replace(r, inclination=r.inclination * (1.0, np.radians(1.0))),
-        "inclination_yz over y is 0.0175 times",
+        "inclination_xz over x is 57.3 times",
     ),
     "taken at 25 Hz": (
         lambda r: at_times(r, None, r.time[0] + (r.time - r.time[0]) * 1.2),
