@@ -21,7 +21,7 @@ from .recording import AXES, PLANES, STICK_WEIGHT, Recording, as_recording, reco
 from .start import check_start
 from .strokes import speed
 from .table import Table, read_table
-from .toml_file import read_toml
+from .toml_file import opened, read_toml
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -221,7 +221,8 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
             Or `out` is something else that is there already. Nothing was written.
     """
     out = new_file(out, Argument("out"), suffix=".nc")
-    meaning = columns if isinstance(columns, TableMap) else open_table_map(columns)
+    where = Argument("columns")
+    meaning = opened(columns, TableMap, open_table_map, where, "map of columns")
     columns_read = [column.column for _, column in meaning.read_columns]
     signs = {"delimiter": meaning.delimiter, "decimal": meaning.decimal, "skip": meaning.skip}
     read = read_table(table, columns_read, **signs)

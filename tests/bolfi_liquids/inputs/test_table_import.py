@@ -167,22 +167,6 @@ def test_the_robot_s_own_gap_is_not_filled():
     np.testing.assert_allclose(made["x"][outside][:-1], made["time"][outside][:-1])
 
 
-SLIPS = {
-    "no column": (lambda rows: rows[0].__setitem__(4, "Angle"), "'A'"),
-    "two columns": (lambda rows: rows[0].__setitem__(6, "X"), "2 columns are named 'X'"),
-    "a line cut off": (lambda rows: rows[7].__delitem__(slice(3, None)), "line 10"),
-}
-
-
-@pytest.mark.parametrize(("change", "says"), SLIPS.values(), ids=SLIPS)
-def test_a_slip_in_the_table_is_named(tmp_path, written, truth, change, says):
-    table = table_of(tmp_path / "bad.csv", truth, change)
-    with pytest.raises(ValueError) as refused:
-        import_table(table, written[1], tmp_path / "bad.nc")
-    assert says in str(refused.value) and "bad.csv" in str(refused.value)
-    assert not (tmp_path / "bad.nc").exists()
-
-
 MAP_SLIPS = {
     "another unit": ('unit = "deg"', 'unit = "rad"', ("inclination_xz", "7.79", "in the map")),
     "no offset": ('"mm", offset = -120.0', '"mm"', ("z, ", "above the")),
