@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field
 
 from ..errors import Argument, InputError
-from .limits import Limits, as_number
+from .limits import as_number
 from .settings import Particles, Seed, checked
 from .table import parse_number
 
@@ -120,6 +120,8 @@ def check_effects(effects: Mapping[str, Any] | None, scene: str) -> dict[str, fl
             what = f"does not act in a {scene}" if name in EFFECTS else "unknown"
             raise InputError(what, where=where, fix=f"there are {', '.join(acting)}")
         effect = EFFECTS[name]
-        limits = Limits("", effect.lowest, effect.highest, effect.unit, f"give {name}=NUMBER")
-        limits.check(number, where)
+        if not effect.lowest <= number <= effect.highest:
+            ends = f"from {effect.lowest:g} to {effect.highest:g} in the unit {effect.unit}"
+            what = f"{value!r:.80} is no coefficient of it"
+            raise InputError(what, where=where, fix=f"give {name}=NUMBER, {ends}")
     return {name: as_number(value) for name, value in effects.items()}

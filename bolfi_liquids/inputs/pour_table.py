@@ -203,22 +203,31 @@ def check_distance(distance: float, cups: "Cups", where: str) -> None:
     """Raise `InputError` for a distance [m] at which the receiver of these cups cannot stand."""
     low, high = (100.0 * end for end in cups.distance_range)
     beyond = max(high - low, 200.0 * cups.receiver.radius)
+    cause = f"the cups stand {low:g} to {high:g} cm apart"
     fix = (
         "give the distance from the lip to the receiver's axis in cm, or the cups that were "
         f"poured with{_in_python('m', where)}"
     )
-    note = f" (the cups stand {low:g} to {high:g} cm apart)"
-    Limits("", low - beyond, high + beyond, "cm", fix).check(100.0 * distance, where, note)
+    limits = Limits(cause, low - beyond, high + beyond, "cm", fix)
+    _check_action(100.0 * distance, limits, where)
 
 
 def check_rate(rate: float, cups: "Cups", where: str) -> None:
     """Raise `InputError` for an angular velocity [rad/s] far from those of these cups."""
-    given, slow, fast = np.degrees([rate, *cups.angular_velocity_range])
-    fix = "give the angular velocity in deg/s, or the cups that were poured with" + _in_python(
-        "rad/s", where
-    )
-    limits = Limits("", slow / MAX_TIMES_BEYOND, fast * MAX_TIMES_BEYOND, "deg/s", fix)
-    limits.check(float(given), where, f" (the cups are turned at {slow:g} to {fast:g} deg/s)")
+    given, slow, fast = map(float, np.degrees([rate, *cups.angular_velocity_range]))
+    cause = f"the cups are turned at {slow:g} to {fast:g} deg/s"
+    fix = "give the angular velocity in deg/s, or the cups that were poured with"
+    ends = slow / MAX_TIMES_BEYOND, fast * MAX_TIMES_BEYOND
+    limits = Limits(cause, *ends, "deg/s", f"{fix}{_in_python('rad/s', where)}")
+    _check_action(given, limits, where)
+
+
+def _check_action(value: float, limits: Limits, where: str) -> None:
+    """Raise `InputError` beyond limits that follow from the cups, with the cause."""
+    cause, least, most, unit, fix = limits
+    if not least <= value <= most:
+        what = f"{value:g} {unit}; {cause}, {least:g} to {most:g} {unit} are allowed"
+        raise InputError(what, where=where, fix=fix)
 
 
 def _in_python(unit: str, where: str) -> str:

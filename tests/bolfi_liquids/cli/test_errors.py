@@ -54,7 +54,7 @@ def test_an_option_without_what_it_needs_is_refused_whatever_its_value(
 
 TYPED = {
     "calibrate": (["stir.nc", "--out", "r", "--budget", "1"], "--budget: 1;"),
-    "simulate pour": (["--angular-velocity", "0"], "--angular-velocity: 0 deg/s"),
+    "simulate pour": (["--angular-velocity", "0"], "--angular-velocity: 0 deg/s;"),
     "check sbc": (["--noise-deg", "-1", "--out", "r"], "--noise-deg: -1.0;"),
     "pour": (["r", "--iterations", "1"], "--iterations: 1;"),
     "record": (["--cycles", "0", "--out", "r"], "--cycles: 0;"),

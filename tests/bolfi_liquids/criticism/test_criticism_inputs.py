@@ -245,5 +245,5 @@ def test_pours_that_the_cups_could_not_make_are_refused(calibration, table, opti
         "pours": table("p.csv"),
         option: table("q.csv", ["45,10,5,90,5", *ROWS, "60,50,33,33,34"]),
     }
-    with pytest.raises(InputError, match=r"q\.csv: distance_cm: 50 cm"):
+    with pytest.raises(InputError, match=r"q\.csv: distance_cm: 50 cm; "):
         given(calibration, **tables)

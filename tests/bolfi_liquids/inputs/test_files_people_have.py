@@ -226,6 +226,7 @@ def test_one_torn_value_is_named_and_missing(made, truth, tmp_path, field, value
 @pytest.mark.parametrize("rate", [10.0, 125.0])  # Hz
 def test_neither_a_stir_nor_the_corners_of_a_fast_path_are_torn(rate):
     assert not any(bundled_recording(liquid).torn for liquid in RECORDED_LIQUIDS)
+    assert not torn_values(0.06 * np.arange(9.0), JUMPS["x"]).any()  # each far from both
     for speed in (0.1, 1.0):  # m/s
         path = star(speed=speed, height=0.2, radius=0.1)
         time = np.arange(path.time[0], path.time[-1], 1.0 / rate)
