@@ -95,7 +95,8 @@ def frame_faults(recording: Recording) -> Iterator[str]:
     if (np.nanmax(position, axis=0) - np.nanmin(position, axis=0)).max() < MIN_TRAVEL:
         return
     path = _delayed(part, part.time)
-    if max(_residual(part, one.path)[0] for one in _turns(path)) < MAX_LEFT:
+    turns = [_residual(part, one.path)[0] for one in _turns(path)]
+    if MAX_RATIO * max(turns) < min(turns) < MAX_LEFT:
         return  # on a circle a turn is a delay
     least, fault = _left(part, path), ""
     for explanations in (_turns(path), _mirrors(path), _camera_faults(part, path)):
@@ -109,14 +110,14 @@ def frame_faults(recording: Recording) -> Iterator[str]:
         yield fault
 
 
-def _turns(path: NDArray) -> Iterator[Explanation]:
+def _turns(path: NDArray[np.complex128]) -> Iterator[Explanation]:
     """The inclination's frame is turned; a small turn is no fault."""
     for turn in TURNS_DEG:
         small = abs(turn) <= MAX_TURN_DEG
         yield Explanation(_turned(path, turn), "" if small else _frame_text(turn, False))
 
 
-def _mirrors(path: NDArray) -> Iterator[Explanation]:
+def _mirrors(path: NDArray[np.complex128]) -> Iterator[Explanation]:
     """One of the two frames is left-handed."""
     for turn in TURNS_DEG:
         yield Explanation(_turned(path, turn).conj(), _frame_text(turn, True))
@@ -135,7 +136,7 @@ def _frame_text(turn: float, mirrored: bool) -> str:
     )
 
 
-def _camera_faults(recording: Recording, path: NDArray) -> Iterator[Explanation]:
+def _camera_faults(recording: Recording, path: NDArray[np.complex128]) -> Iterator[Explanation]:
     """One plane is late, turned or in another unit, or pictures have stamps of another rate."""
     time = recording.time
     for plane, other in (PLANES, PLANES[::-1]):
@@ -174,24 +175,26 @@ def _delayed(recording: Recording, time: NDArray) -> NDArray[np.complex128]:
     return x + 1j * y
 
 
-def _turned(path: NDArray, turn_deg: float) -> NDArray[np.complex128]:
+def _turned(path: NDArray[np.complex128], turn_deg: float) -> NDArray[np.complex128]:
     return np.exp(1j * np.radians(turn_deg)) * path
 
 
-def _of_plane(plane: str, changed: NDArray, path: NDArray) -> NDArray[np.complex128]:
+def _of_plane(
+    plane: str, changed: NDArray[np.complex128], path: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
     """The path, changed for one plane alone."""
     if plane == PLANES[0]:
         return changed.real + 1j * path.imag
     return path.real + 1j * changed.imag
 
 
-def _left(recording: Recording, path: NDArray) -> float:
+def _left(recording: Recording, path: NDArray[np.complex128]) -> float:
     """Share of the variance that a response to a path leaves: all if the stick would lead it."""
     share, trails = _residual(recording, path)
     return share if trails else 1.0
 
 
-def _residual(recording: Recording, path: NDArray) -> tuple[float, bool]:
+def _residual(recording: Recording, path: NDArray[np.complex128]) -> tuple[float, bool]:
     """Fit of one response of both planes to a path (T, delays).
 
     Returns:

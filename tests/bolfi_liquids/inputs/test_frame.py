@@ -116,6 +116,7 @@ def test_on_a_circle_a_delay_is_not_taken_for_a_turn():
     assert list(frame_faults(shaken(steady))) == []
     eight = moving(recording, 0.02 * np.sin(phase), 0.02 * np.sin(1.7 * phase))
     assert "add 45 to" in next(frame_faults(turned(eight, 45.0)))
+    assert "add 45 to" in next(frame_faults(turned(recording.first(120), 45.0)))
 
 
 def test_strokes_along_one_line_tell_a_turn_but_no_mirror():
