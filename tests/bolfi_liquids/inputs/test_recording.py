@@ -71,6 +71,11 @@ XZ, YZ = "inclination_xz", "inclination_yz"
 K = np.arange(201)  # samples
 BAD = {
     "no fields": (lambda d: d.drop_vars(["x", YZ]), f"x, {YZ}", "missing"),
+    "two columns": (
+        lambda d: d.assign(x=(("time", "k"), np.ones((201, 2)), {"units": "m"})),
+        "x",
+        "dimensions ('time', 'k')",
+    ),
     "time goes back": (times(lambda t: np.r_[t[:50], t[48], t[51:]]), "time", "1.6 s"),
     "nine samples": (lambda d: d.isel(time=slice(0, 9)), "time", " = 9"),
     "time in ms": (times(lambda t: 1000.0 * t), "time", "33.3333 s"),
