@@ -9,8 +9,8 @@ import numpy as np
 
 from .errors import Argument, InputError
 from .files import existing_file, new_file, write_netcdf
-from .inputs.described_liquid import number_of
-from .inputs.fields import check_fields
+from .inputs.checks import check_times
+from .inputs.limits import number_of
 from .inputs.open import check_recording, open_recording, read_fields
 from .inputs.recording import Recording, as_recording
 from .inputs.start import first_rest
@@ -57,7 +57,6 @@ def trim(
     part = dataset.isel(time=np.flatnonzero(kept))
     for name in part.variables:
         part[name].encoding.clear()  # chunks of the whole may be longer than the part
-    check_fields(part, path)
     check_recording(as_recording(part, path, content))
     now = datetime.now(UTC).isoformat(timespec="seconds")
     made = (
@@ -78,11 +77,8 @@ def proposed_cut(
     Raises:
         InputError: The recording has no such times.
     """
-    where = str(recording.path)
-    time = recording.time
-    if not len(time) or not np.isfinite(time).all() or (np.diff(time) <= 0.0).any():
-        fix = "sort the samples, drop repeated ones, and give each a time"
-        raise InputError("times do not increase", where=f"{where}: time", fix=fix)
+    where, time = str(recording.path), recording.time
+    check_times(recording)
     stop = _last_seen(recording) if stop is None else number_of(stop, Argument("stop"))
     if start is not None:
         start = number_of(start, Argument("start"))

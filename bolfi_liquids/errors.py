@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
-    from pydantic_core import ErrorDetails
 
 
 class Argument(str):
@@ -50,51 +49,23 @@ class InputError(ValueError):
 
     @classmethod
     def from_validation(
-        cls, err: "ValidationError", *, where: Callable[[str], str], fix: str | None = None
+        cls, err: "ValidationError", *, where: Callable[[str], str]
     ) -> "InputError":
-        """The first fault that pydantic found.
+        """The first fault that pydantic found in settings.
 
         Args:
-            err: Of any model or dataclass.
-            where: Names a field's file or option, from its dotted name; "" is the whole.
-            fix: What to do about it; None gives the rule that the value breaks.
+            err: Of a dataclass.
+            where: Names a field's option, from its dotted name; "" is the whole.
         """
-        errors = err.errors(include_url=False)
-        # a mistyped name is missing under its right one, too
-        first = min(errors, key=lambda one: one["type"] != "extra_forbidden")
+        first = err.errors(include_url=False)[0]
         own = first.get("ctx", {}).get("error")
         if isinstance(own, cls):
             return own
-        place = where(".".join(map(str, first["loc"])))
-        if fix is None:
-            what, fix = (
-                f"{first['input']!r:.80}",
-                _said(first).replace("Input should", "it must", 1),
-            )
-        else:
-            what = _fault(first, errors)
-        return cls(what, where=place, fix=fix)
+        rule = first["msg"].removeprefix("Value error, ").replace("Input should", "it must", 1)
+        return cls(
+            f"{first['input']!r:.80}", where=where(".".join(map(str, first["loc"]))), fix=rule
+        )
 
     def __reduce__(self):
         """It reaches the terminal from the processes that share long work, too."""
         return partial(InputError, where=self.where, fix=self.fix), (self.what,)
-
-
-def _said(error: "ErrorDetails") -> str:
-    return error["msg"].removeprefix("Value error, ")
-
-
-def _fault(error: "ErrorDetails", errors: "list[ErrorDetails]") -> str:
-    """What is wrong, and the value where it is short."""
-    if error["type"] == "missing":
-        return "is missing"
-    if error["type"] == "extra_forbidden":
-        beside = [
-            str(other["loc"][-1])
-            for other in errors
-            if other["type"] == "missing" and other["loc"][:-1] == error["loc"][:-1]
-        ]
-        missing = f", and {', '.join(beside)} is missing" if beside else ""
-        return f"is no field that is known{missing}"
-    given = error["input"]
-    return _said(error) + (f", got {given!r:.80}" if isinstance(given, str | int | float) else "")

@@ -10,16 +10,17 @@ from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
 from importlib.resources import as_file, files
 from pathlib import Path
+from types import NoneType
 from typing import Any, NamedTuple, get_args
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from .errors import RigError
 from .motion.kinematics import forward, inverse
 from .motion.poses import cup_frame, rotation_matrix
 from .motion.stir_paths import above_cup
-from .rig import CHECK_ENDS, MIN_CUP_RADIUS, Camera, Rig, RigSection
+from .rig import CHECK_ENDS, MIN_CUP_RADIUS, Camera, Rig
 from .safety.limits import MAX_TILT, Workspace, workspace
 
 BUNDLED = "rig.toml"
@@ -89,29 +90,37 @@ def _checked(written: dict[str, Any], where: str) -> Rig:
     try:
         rig = Rig.model_validate(written, context=CHECK_ENDS, extra="forbid")
     except ValidationError as err:
-        raise _refusal([*_faults(err)], where) from err
-    for fault in contradictions(rig):
-        raise _refusal([fault], where)
+        what, place = named_faults(field_faults(err, Rig), where)
+        raise RigError(what, where=place, fix=COMPARE) from err
+    for field, what, fix in contradictions(rig):
+        raise RigError(what, where=f"{where}: {field}" if field else where, fix=fix)
     return rig
 
 
-def _refusal(faults: list[RigFault], where: str) -> RigError:
-    """Error that names one fault, or several independent ones."""
-    if len(faults) == 1:
-        field, what, fix = faults[0]
-        return RigError(what, where=f"{where}: {field}" if field else where, fix=fix)
-    told = ", ".join(f"{field}: {what}" for field, what, _ in faults)
-    return RigError(told, where=where, fix=COMPARE)
+def named_faults(faults: Iterable[RigFault], where: str) -> tuple[str, str]:
+    """What is wrong and where, of one fault or of several independent ones."""
+    several = [*faults]
+    if len(several) > 1:
+        return ", ".join(f"{field}: {what}" for field, what, _ in several), where
+    ((field, what, _),) = several
+    return what, f"{where}: {field}" if field else where
 
 
-def _faults(err: ValidationError) -> Iterator[RigFault]:
-    """Missing and unknown fields, wrong types, numbers beyond their ends."""
+def field_faults(err: ValidationError, model: type[BaseModel]) -> Iterator[RigFault]:
+    """Missing and unknown fields, wrong types, numbers beyond their ends.
+
+    Args:
+        err: Of the values of a file.
+        model: What they should have been.
+    """
     for one in err.errors(include_url=False, include_context=False):
         name, given = ".".join(map(str, one["loc"])), one["input"]
         what = one["msg"].removeprefix("Value error, ")
-        if one["type"] == "extra_forbidden":
+        if one["type"] == "missing":
+            what = "is required, but missing"
+        elif one["type"] == "extra_forbidden":
             *way, unknown = one["loc"]
-            known = _section(way).model_fields
+            known = _section(model, way).model_fields
             likely = get_close_matches(str(unknown), known, n=1)
             hint = f"did you mean {likely[0]}?" if likely else f"known: {', '.join(known)}"
             what = f"no such field ({hint})"
@@ -120,11 +129,17 @@ def _faults(err: ValidationError) -> Iterator[RigFault]:
         yield RigFault(name, what)
 
 
-def _section(way: list[int | str]) -> type[RigSection]:
-    """The part of a rig to which names of fields, and indices into tuples, lead."""
-    kind: Any = Rig
+def _section(model: type[BaseModel], way: list[int | str]) -> type[BaseModel]:
+    """The part of a model to which names of fields, and indices into tuples, lead."""
+    kind: Any = model
     for step in way:
-        kind = get_args(kind)[step] if isinstance(step, int) else kind.model_fields[step].annotation
+        if isinstance(step, int):
+            kinds = get_args(kind)
+            kind = kinds[0] if kinds[-1] is ... else kinds[step]
+        else:
+            kind = kind.model_fields[step].annotation
+        kinds = get_args(kind)
+        kind = kinds[0] if kinds[1:] == (NoneType,) else kind
     return kind
 
 

@@ -1,6 +1,7 @@
 """The cups of a pour, as a person writes them down in a cups.toml."""
 
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,51 +10,57 @@ from pydantic import (
     AfterValidator,
     BaseModel,
     Field,
+    GetCoreSchemaHandler,
     ValidationError,
     model_validator,
 )
+from pydantic_core import CoreSchema, core_schema
 
 from .numerics import MODEL_VERSION
 from .pours.resolution import LEAST_VISCOSITY, Filled, settings
 
-MIN_SIZE, MAX_RADIUS, MAX_HEIGHT = 5e-3, 0.25, 0.5  # [m] of cups that are poured by hand or arm
-MIN_FILL, MAX_LIP_HEIGHT = 1e-3, 1.0  # [m]
-MAX_DISTANCE = 0.5  # [m] from the lip to the receiver's axis
 SLOWEST, FASTEST = 0.01, 30.0  # rad/s: a pour of three minutes; a cup that is flung
 CONTACT_ANGLE_DEG = 60.0
 """Of a cup whose file has none: between those of water on glass and on plastics."""
 
 
-def _up_to(most: float) -> AfterValidator:
-    """A rule for lengths [m], which guesses at the unit of those that break it."""
+@dataclass(frozen=True)
+class Within:
+    """Ends of a number, both allowed, and its unit; annotates the number's field."""
 
-    def check(length: float) -> float:
-        if abs(length) > most:
-            unit = "millimetres" if abs(length) > 10.0 * most else "centimetres"
-            raise ValueError(f"{length:g} m looks like {unit}; convert it to m")
-        return length
+    low: float
+    high: float
+    unit: str
 
-    return AfterValidator(check)
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_after_validator_function(self._checked, handler(source))
+
+    def _checked(self, value: float) -> float:
+        if not self.low <= value <= self.high:
+            ends = f"{self.low:.3g} to {self.high:.5g} {self.unit}"
+            raise ValueError(f"it must be {ends}, got {value:g}")
+        return value
 
 
-def _pourable(rate: float) -> float:
-    """A rule for angular velocities [deg/s], the same as that of `pour`."""
-    if not SLOWEST <= np.radians(rate) <= FASTEST:
-        slowest, fastest = np.degrees([SLOWEST, FASTEST])
-        raise ValueError(f"it must be {slowest:.3g} to {fastest:.5g} deg/s")
-    return rate
+def _wets(angle: float) -> float:
+    """A rule for contact angles [deg]: a small one other than 0 is in radians."""
+    if 0.0 < angle <= np.pi:
+        raise ValueError(f"it must be 0 or above {np.pi:.2f} deg, got {angle:g}; no radians")
+    return angle
 
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Radius = Annotated[Number, Field(ge=MIN_SIZE), _up_to(MAX_RADIUS)]
-Height = Annotated[Number, Field(ge=MIN_SIZE), _up_to(MAX_HEIGHT)]
-Depth = Annotated[Number, Field(ge=MIN_FILL), _up_to(MAX_HEIGHT)]
-LipHeight = Annotated[Number, Field(ge=MIN_SIZE), _up_to(MAX_LIP_HEIGHT)]
-Distance = Annotated[Number, _up_to(MAX_DISTANCE)]
-Degrees = Annotated[Number, Field(gt=0, le=180)]
-ContactDegrees = Annotated[Number, Field(ge=0, le=180)]
-DegreesPerSecond = Annotated[Number, AfterValidator(_pourable)]
-Seconds = Annotated[Number, Field(ge=0, le=60)]
+Radius = Annotated[Number, Within(5e-3, 0.25, "m")]  # of cups that are poured by hand or arm
+Height = Annotated[Number, Within(5e-3, 0.5, "m")]
+Depth = Annotated[Number, Within(1e-3, 0.5, "m")]
+LipHeight = Annotated[Number, Within(5e-3, 1.0, "m")]
+Distance = Annotated[Number, Within(-0.5, 0.5, "m")]
+Turn = Annotated[Number, Within(5.0, 180.0, "deg")]
+ContactAngle = Annotated[Number, Within(0.0, 180.0, "deg"), AfterValidator(_wets)]
+Rate = Annotated[Number, Within(float(np.degrees(SLOWEST)), float(np.degrees(FASTEST)), "deg/s")]
+Hold = Annotated[Number, Within(0.0, 60.0, "s")]
 
 
 class _Section(BaseModel, frozen=True, extra="forbid"):
@@ -61,15 +68,19 @@ class _Section(BaseModel, frozen=True, extra="forbid"):
 
 
 class Source(_Section, frozen=True):
-    """The cup that turns [m]; `fill` is the liquid's depth before the pour.
+    """The cup that turns.
 
-    `contact_angle_deg` is that of the liquid's surface with wall and rim: below 90 it wets them.
+    Attributes:
+        radius: Inside [m].
+        height: Inside [m].
+        fill: Depth of the liquid before the pour, up to the height [m].
+        contact_angle_deg: Of the liquid's surface with wall and rim [deg]: below 90 it wets them.
     """
 
     radius: Radius
     height: Height
     fill: Depth
-    contact_angle_deg: ContactDegrees = CONTACT_ANGLE_DEG
+    contact_angle_deg: ContactAngle = CONTACT_ANGLE_DEG
 
     @property
     def filled(self) -> Filled:
@@ -84,19 +95,32 @@ class Source(_Section, frozen=True):
 
 
 class Receiver(_Section, frozen=True):
-    """The cup below [m]."""
+    """The cup below.
+
+    Attributes:
+        radius: Inside [m].
+        height: Inside, less than the lip height [m].
+    """
 
     radius: Radius
     height: Height
 
 
 class PourPlan(_Section, frozen=True):
-    """How the source turns, and the range of the decision, in the units that people type."""
+    """How the source turns, and the range of the decision, in the units that people type.
+
+    Attributes:
+        lip_height: Of the source's lip above the receiver's floor [m]; the source turns about it.
+        final_angle_deg: Angle at which the source stays; the liquid must reach the lip [deg].
+        hold: Time at the final angle [s].
+        angular_velocity_deg_s: Lowest and highest of the source [deg/s].
+        distance: Shortest and longest from the lip to the receiver's axis, horizontally [m].
+    """
 
     lip_height: LipHeight
-    final_angle_deg: Degrees
-    hold: Seconds
-    angular_velocity_deg_s: tuple[DegreesPerSecond, DegreesPerSecond]
+    final_angle_deg: Turn
+    hold: Hold
+    angular_velocity_deg_s: tuple[Rate, Rate]
     distance: tuple[Distance, Distance]
 
     @property
@@ -155,7 +179,7 @@ class Cups(_Section, frozen=True):
         except UnicodeDecodeError as err:
             raise ValueError(f"{path}: not a text file") from err
         except ValidationError as err:
-            raise ValueError(f"{path}: {_first_fault(err)}") from err
+            raise ValueError(f"{path}: {_faults(err)}") from err
 
     @property
     def angular_velocity_range(self) -> tuple[float, float]:
@@ -197,11 +221,13 @@ class Cups(_Section, frozen=True):
         }
 
 
-def _first_fault(err: ValidationError) -> str:
-    """Field, fault and value of the first error, in one line."""
-    first = err.errors()[0]
-    field = ".".join(str(part) for part in first["loc"]) or "cups"
-    fault = first["msg"].removeprefix("Value error, ")
-    # of a missing field or a whole section the value says nothing
-    value = first.get("input")
-    return f"{field}: {fault}" + ("" if isinstance(value, dict) else f", got {value!r}")
+def _faults(err: ValidationError) -> str:
+    """Fields, faults and values, in one line."""
+    told = []
+    for one in err.errors():
+        field = ".".join(map(str, one["loc"])) or "cups"
+        fault, value = one["msg"].removeprefix("Value error, "), one["input"]
+        # of a missing field or a whole section the value says nothing
+        own = one["type"] == "value_error" or isinstance(value, dict)
+        told.append(f"{field}: {fault}" + ("" if own else f", got {value!r}"))
+    return "; ".join(told)

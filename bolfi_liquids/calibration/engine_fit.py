@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inputs.fields import PLANE_NAMES
+from ..inputs.recording import PLANE_NAMES
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
 from ..inputs.strokes import stroke_numbers
 from ..models.numerics import cells_in_radius

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..inputs.fields import PLANE_NAMES
-from ..inputs.recording import Recording, planned_recording
+from ..inputs.recording import PLANE_NAMES, Recording, planned_recording
 from ..inputs.strokes import resting, speed, strokes
 from ..simulators import StirSimulator
 

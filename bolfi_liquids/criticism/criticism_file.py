@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..inference.criticism.verdict_kind import VerdictKind
-from ..inputs.fields import PLANE_NAMES
+from ..inputs.recording import PLANE_NAMES
 from .pours import OUTCOMES
 
 if TYPE_CHECKING:

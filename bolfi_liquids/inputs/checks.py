@@ -10,25 +10,22 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from .described_liquid import number_of
-from .fields import AXES, PLANES, STICK_WEIGHT
-from .recording import JUMPS, Recording, steps, torn_values
+from .limits import ABOVE_0, BELOW_1, INF, Limits, number_of
+from .recording import AXES, JUMPS, PLANES, STICK_WEIGHT, Recording, steps, torn_values
 from .start import above_liquid, noise_of
 
-INF, ABOVE_0, BELOW_1 = np.inf, float(np.finfo(float).tiny), float(np.nextafter(1.0, 0.0))
-
-LIMITS = {
-    "cup_radius": (5e-3, 0.25, "m"),
-    "cup_height": (5e-3, 0.5, "m"),
-    "fill": (1e-3, 0.5, "m"),
-    "stick_radius": (2e-4, 0.05, "m"),
-    "stick_length": (0.02, 1.0, "m"),
-    "liquid_density": (50.0, 20_000.0, "kg/m3"),
-    "stick_density": (50.0, 20_000.0, "kg/m3"),
-    "stick_mass": (ABOVE_0, 2.0, "kg"),
+REMEASURE = "give a number in SI units, or measure it again"
+SIZES = {
+    "cup_radius": Limits("", 5e-3, 0.25, "m", REMEASURE),
+    "cup_height": Limits("", 5e-3, 0.5, "m", REMEASURE),
+    "fill": Limits("", 1e-3, 0.5, "m", REMEASURE),
+    "stick_radius": Limits("", 2e-4, 0.05, "m", REMEASURE),
+    "stick_length": Limits("", 0.02, 1.0, "m", REMEASURE),
+    "liquid_density": Limits("", 50.0, 20_000.0, "kg/m3", REMEASURE),
+    "stick_density": Limits("", 50.0, 20_000.0, "kg/m3", REMEASURE),
+    "stick_mass": Limits("", ABOVE_0, 2.0, "kg", REMEASURE),
 }
-"""Smallest and largest value of each attribute, and its unit."""
+"""Limits of each attribute."""
 
 OUTER = {"fill": "cup_height", "stick_radius": "cup_radius"}
 """Sizes that must be smaller than another one."""
@@ -39,6 +36,10 @@ MIN_SEEN = 0.5
 """Smallest share of a plane's samples in which the stick must have been seen."""
 MIN_FROZEN_TIME = 0.25
 """Time of equal numbers that is no coincidence of a coarse scale [s]."""
+MAX_STAIRS = 0.05
+"""Usual time between updates of a value that is held in between [s]: half of it is a delay."""
+MIN_LEVELS_SHARE = 0.5
+"""Of different values among those that are held: a coarse scale shows fewer again and again."""
 MIN_SPEED_SHARE = 0.2
 """Of the gripper's usual speed, above which it moves."""
 MAX_NOISE_SHARE = 0.8
@@ -55,65 +56,51 @@ Measured = float | tuple[float, str]
 
 
 class Rule(NamedTuple):
-    """A quantity of a recording, its limits, and what to do beyond them.
+    """A quantity of a recording, and its limits.
 
     Attributes:
         fields: Variables or attributes that it holds for, one by one.
-        quantity: Its name.
         measure: Its value in a recording for a field; NaN lies outside of all limits.
-        least: The smallest value allowed.
-        most: The largest value allowed.
-        unit: Of value and limits.
-        fix: The remedy.
+        limits: With the remedy.
     """
 
     fields: tuple[str, ...]
-    quantity: str
     measure: Callable[[Recording, str], Measured]
-    least: float
-    most: float
-    unit: str
-    fix: str
+    limits: Limits
 
-    def check(self, recording: Recording) -> None:
-        """Raise `InputError` outside of the limits."""
+    def check(self, recording: Recording, hint: str = "") -> None:
+        """Raise `InputError` outside of the limits; `hint` ends the remedy."""
+        limits = self.limits._replace(fix=f"{self.limits.fix}{hint}")
         for field in self.fields:
             measured = self.measure(recording, field)
             value, note = measured if isinstance(measured, tuple) else (measured, "")
-            if self.least <= value <= self.most:
-                continue
-            attribute = "attribute " if field in LIMITS else ""
-            raise InputError(
-                f"{self.quantity} = {value:.6g} {self.unit}".strip(" =")
-                + f"{note}, {_span(self.least, self.most)} {self.unit}".rstrip()
-                + " allowed",
-                where=f"{recording.path}: {attribute}{field}",
-                fix=self.fix,
-            )
+            attribute = "attribute " if field in SIZES else ""
+            limits.check(value, f"{recording.path}: {attribute}{field}", note)
 
 
-def check_values(recording: Recording) -> None:
-    """Raise `InputError` at the first value that no simulator could use."""
-    sizes = [
-        Rule((name,), "", _size, least, most, unit, f"give a number in {unit}, or measure it again")
-        for name, (least, most, unit) in LIMITS.items()
-        if name in recording.attrs or name not in STICK_WEIGHT
-    ]
-    for rule in (*sizes, *RULES):
+def check_values(recording: Recording, hint: str = "") -> None:
+    """Raise `InputError` at the first value that no simulator could use.
+
+    Args:
+        recording: The recording.
+        hint: What else may help, at the end of each remedy.
+    """
+    for name, limits in SIZES.items():
+        if name in recording.attrs or name not in STICK_WEIGHT:
+            Rule((name,), _size, limits).check(recording, hint)
+    for rule in RULES:
+        rule.check(recording, hint)
+
+
+def check_times(recording: Recording) -> None:
+    """Raise `InputError` unless the times increase."""
+    for rule in TIMES:
         rule.check(recording)
 
 
 def _size(recording: Recording, field: str) -> Measured:
     """An attribute, which must be a number."""
     return number_of(recording.attrs.get(field), f"{recording.path}: attribute {field}")
-
-
-def _span(least: float, most: float) -> str:
-    if least == ABOVE_0:
-        return f"above 0 to {most:g}"
-    if not np.isfinite(most):
-        return f"at least {least:g}"
-    return f"{least:g}" if least == most else f"{least:g} to {most:g}"
 
 
 def longest_gap(time: NDArray, seen: NDArray[np.bool_]) -> tuple[float, float]:
@@ -130,6 +117,11 @@ def longest_gap(time: NDArray, seen: NDArray[np.bool_]) -> tuple[float, float]:
     gaps = np.diff(edges)
     at = int(gaps.argmax())
     return float(gaps[at]), float(edges[at])
+
+
+def _missing_times(recording: Recording, field: str) -> Measured:
+    missing = np.isnan(recording.time)
+    return int(missing.sum()), f" (the first is of sample {int(missing.argmax())})"
 
 
 def _repeated(recording: Recording, field: str) -> Measured:
@@ -215,6 +207,15 @@ def _torn(recording: Recording, field: str) -> Measured:
     )
 
 
+def _jump(recording: Recording, field: str) -> Measured:
+    """Greatest speed from one sample to the next, of those further apart than a torn value."""
+    seen = np.flatnonzero(np.isfinite(recording.gripper.position).all(axis=1))
+    way, step = steps(recording.time[seen], recording.gripper.position[seen])
+    speed = np.where(way > JUMPS["x"], way / step, 0.0)
+    at = int(speed.argmax())
+    return float(speed[at]), f" over {way[at]:.3g} m after sample {seen[at]}"
+
+
 def _frozen(recording: Recording, field: str) -> tuple[float, float, str]:
     """Time of one and the same number while the gripper moves: longest [s], and share of all."""
     values, time, position = recording.values(field), *recording.gripper
@@ -241,6 +242,26 @@ def _frozen_time(recording: Recording, field: str) -> Measured:
 def _frozen_share(recording: Recording, field: str) -> Measured:
     _, share, note = _frozen(recording, field)
     return share, note
+
+
+def _stairs(recording: Recording, field: str) -> Measured:
+    """Usual time between updates of what is held from sample to sample; 0 if nothing is [s].
+
+    The levels of a stair differ from each other, while the steps of a coarse scale are few.
+    """
+    values = recording.values(field) if field in PLANES else recording.gripper.position
+    values = values.reshape(len(recording.time), -1)
+    seen = np.isfinite(values).all(axis=1)
+    time, values = recording.time[seen], values[seen]
+    way, step = steps(time, values)
+    updates = np.flatnonzero(way > 0.0)
+    if len(updates) < 2:
+        return 0.0
+    between, usual = float(np.median(np.diff(time[updates]))), float(np.median(step))
+    levels = len(np.unique(values[updates], axis=0))
+    if between < 1.5 * usual or levels < MIN_LEVELS_SHARE * len(updates):
+        return 0.0
+    return between, f" (updates at {1.0 / between:.3g} Hz in samples at {1.0 / usual:.3g} Hz)"
 
 
 def _noise_deg(recording: Recording, field: str) -> Measured:
@@ -315,11 +336,14 @@ def _buoyancy(recording: Recording, field: str) -> Measured:
 
 
 TIME, WEIGHT = ("time",), (" or ".join(STICK_WEIGHT),)
-XY, ALL, TIP = ("x, y",), (", ".join(JUMPS),), ("z, stick_length",)
+PATH, XY, ALL, TIP = (", ".join(AXES),), ("x, y",), (", ".join(JUMPS),), ("z, stick_length",)
 LEANS = (", ".join(PLANES),)
 MEASURE, AGAIN = "measure both again, in m", "look at what was measured, and record again"
 MASS = "give the mass in kg, or measure the stick again"
+ORDER = "sort the samples by time; where a clock was set back, add what it lost"
+STAMP = "give each sample its time, or leave out its row"
 STILL = "mark samples of a camera that stood still by NaN, or record again"
+HELD = "mark samples between updates by NaN, or give each its own value"
 CLOCKS = "shift the stamps of one log onto the other's clock"
 DECIMALS = "write times with more decimals, or import a table with `rate_hz` in its map"
 ANGLE = "give it in rad from the downward vertical, and NaN where the stick was not seen"
@@ -330,31 +354,45 @@ AXIS = "shift x and y to the cup's axis, or correct cup_radius"
 CUT = "cut the recording before it"
 FROZEN = "of one number while the gripper moves"
 
+TIMES = (
+    Rule(TIME, lambda r, _: len(r.time), Limits("number of samples", 10, INF, "", "record more")),
+    Rule(TIME, _missing_times, Limits("missing stamps", 0, 0, "", STAMP)),
+    Rule(TIME, _repeated, Limits("repeated stamps", 0, 0, "", DECIMALS)),
+    Rule(TIME, _shortest_step, Limits("shortest step", 1e-9, INF, "s", ORDER)),
+)
 RULES = (
-    Rule(TIME, "number of samples", lambda r, _: len(r.time), 10, INF, "", "record more"),
-    Rule(TIME, "repeated stamps", _repeated, 0, 0, "", DECIMALS),
-    Rule(TIME, "shortest step", _shortest_step, 1e-9, INF, "s", "sort the samples by time"),
-    Rule(TIME, "usual step", _usual_step, 0, 1, "s", "give times in s"),
-    Rule(("stick_mass",), "density", _made_density, 0, 25e3, "kg/m3", MASS),
-    Rule(tuple(OUTER), "part", _part, 0, BELOW_1, "", MEASURE),
-    Rule(TIME, "difference of arm's and cameras' clocks", _clock_difference, 0, 0, "s", CLOCKS),
-    Rule(AXES, "largest position", _largest, 0, 2, "m", "give positions in m"),
-    Rule(AXES, "longest time without a position", _gap, 0, MAX_GRIPPER_GAP, "s", CUT),
-    Rule(TIME, "usual speed", _usual_speed, 0, 1, "m/s", "give times in s and positions in m"),
+    *TIMES,
+    Rule(TIME, _usual_step, Limits("usual step", 0, 1, "s", "give times in s")),
+    Rule(("stick_mass",), _made_density, Limits("density", 0, 25e3, "kg/m3", MASS)),
+    Rule(tuple(OUTER), _part, Limits("part", 0, BELOW_1, "", MEASURE)),
+    Rule(TIME, _clock_difference, Limits("difference of the clocks", 0, 0, "s", CLOCKS)),
+    Rule(AXES, _largest, Limits("largest position", 0, 2, "m", "give positions in m")),
+    Rule(AXES, _gap, Limits("longest time without a position", 0, MAX_GRIPPER_GAP, "s", CUT)),
     Rule(
-        PLANES, "share of samples with the stick in sight", _seen, MIN_SEEN, 1, "", "record again"
+        TIME, _usual_speed, Limits("usual speed", 0, 1, "m/s", "give times in s and positions in m")
     ),
-    Rule(PLANES, "longest time without an inclination", _gap, 0, 0.5, "s", CUT),
-    Rule(PLANES, "largest inclination", _largest, 0, np.pi / 2, "rad", ANGLE),
-    Rule(ALL, "samples that jump out and back", _torn, 0, 0, "", AGAIN),
-    Rule(PLANES, f"longest time {FROZEN}", _frozen_time, 0, 1, "s", STILL),
-    Rule(PLANES, f"share of the time {FROZEN}", _frozen_share, 0, 0.25, "", STILL),
-    Rule(PLANES, "noise from sample to sample", _noise_deg, 0, 3, "deg", AGAIN),
-    Rule(PLANES, "share of samples beyond the cup's rim", _beyond_rim, 0, 0.02, "", RIM),
-    Rule(LEANS, "largest inclination", _lean_deg, 0.2, INF, "deg", ONCE),
-    Rule(XY, "room between stick and wall", _room, 0, INF, "m", AXIS),
-    Rule(XY, "travel", _travel, 1e-3, INF, "m", "record a stir, in m"),
-    Rule(TIP, "depth of the stick in the liquid", _depth, 1e-6, INF, "m", FLOOR),
-    Rule(TIP, "height of the tip above the floor", _above_floor, 0, INF, "m", FLOOR),
-    Rule(WEIGHT, "buoyancy / weight", _buoyancy, 0, BELOW_1, "", "weigh the stick; it must hang"),
+    Rule(
+        PLANES,
+        _seen,
+        Limits("share of samples with the stick in sight", MIN_SEEN, 1, "", "record again"),
+    ),
+    Rule(PLANES, _gap, Limits("longest time without an inclination", 0, 0.5, "s", CUT)),
+    Rule(PLANES, _largest, Limits("largest inclination", 0, np.pi / 2, "rad", ANGLE)),
+    Rule(ALL, _torn, Limits("samples that jump out and back", 0, 0, "", AGAIN)),
+    Rule(PATH, _jump, Limits("speed of a jump", 0, 2.5, "m/s", AGAIN)),
+    Rule(PLANES, _frozen_time, Limits(f"longest time {FROZEN}", 0, 1, "s", STILL)),
+    Rule(PLANES, _frozen_share, Limits(f"share of the time {FROZEN}", 0, 0.25, "", STILL)),
+    Rule((*PATH, *PLANES), _stairs, Limits("stairs", 0, MAX_STAIRS, "s", HELD)),
+    Rule(PLANES, _noise_deg, Limits("noise from sample to sample", 0, 3, "deg", AGAIN)),
+    Rule(PLANES, _beyond_rim, Limits("share of samples beyond the cup's rim", 0, 0.02, "", RIM)),
+    Rule(LEANS, _lean_deg, Limits("largest inclination", 0.2, INF, "deg", ONCE)),
+    Rule(XY, _room, Limits("room between stick and wall", 0, INF, "m", AXIS)),
+    Rule(XY, _travel, Limits("travel", 1e-3, INF, "m", "record a stir, in m")),
+    Rule(TIP, _depth, Limits("depth of the stick in the liquid", 1e-6, INF, "m", FLOOR)),
+    Rule(TIP, _above_floor, Limits("height of the tip above the floor", 0, INF, "m", FLOOR)),
+    Rule(
+        WEIGHT,
+        _buoyancy,
+        Limits("buoyancy / weight", 0, BELOW_1, "", "weigh the stick; it must hang"),
+    ),
 )

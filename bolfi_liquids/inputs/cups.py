@@ -5,21 +5,18 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic import ValidationError
-
-from ..errors import Argument, InputError
-from .toml_file import read_toml
+from ..errors import Argument
+from .toml_file import opened, read_toml, validated
 
 if TYPE_CHECKING:
     from ..models import Cups
 
-BUNDLED = "cups.toml"
 FIX = "compare with the bundled cups.toml"
 
 
 def bundled_cups() -> "Cups":
     """The cups that come with the package."""
-    with as_file(files("bolfi_liquids.data") / BUNDLED) as path:
+    with as_file(files("bolfi_liquids.data") / "cups.toml") as path:
         return open_cups(path)
 
 
@@ -33,22 +30,8 @@ def cups_of(given: "Cups | str | Path | None") -> "Cups":
 
     if given is None:
         return bundled_cups()
-    if isinstance(given, str | Path):
-        return open_cups(given)
-    if not isinstance(given, Cups):
-        raise InputError(
-            f"{given!r:.80} is no pair of cups",
-            where=Argument("cups"),
-            fix="give the path of a TOML file, or models.Cups",
-        )
-    try:
-        return Cups.model_validate(given.model_dump())  # copies may hold what no file may
-    except ValidationError as err:
-
-        def where(field: str) -> str:
-            return f"cups: {field}" if field else "cups"
-
-        raise InputError.from_validation(err, where=where, fix=FIX) from err
+    cups = opened(given, Cups, open_cups, Argument("cups"), "pair of cups")
+    return validated(cups.model_dump(), Cups, "cups", FIX)  # copies may hold what no file may
 
 
 def kept_cups(settings: Mapping[str, Any]) -> "Cups":

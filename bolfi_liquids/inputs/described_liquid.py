@@ -4,12 +4,12 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from importlib.metadata import version
-from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
 from ..errors import Argument, InputError
+from .limits import as_number
 from .settings import Particles, Seed, checked
 from .table import parse_number
 
@@ -76,24 +76,6 @@ class Described:
         }
 
 
-def number_of(value: Any, where: str) -> float:
-    """A value that must be one number.
-
-    Raises:
-        InputError: It is something else; `where` is named.
-    """
-    if not math.isfinite(number := _as_number(value)):
-        given = " ".join(repr(value).split())
-        raise InputError(f"{given:.80}", where=where, fix="give one finite number")
-    return number
-
-
-def _as_number(value: Any) -> float:
-    """The value, which may be an array without axes; NaN where it is no number."""
-    plain = value.item() if getattr(value, "shape", None) == () else value
-    return float(plain) if isinstance(plain, Real) and not isinstance(plain, bool) else math.nan
-
-
 def read_effects(given: Iterable[str], scene: str) -> dict[str, float]:
     """Coefficients by name, from texts NAME=VALUE.
 
@@ -130,19 +112,16 @@ def check_effects(effects: Mapping[str, Any] | None, scene: str) -> dict[str, fl
         raise InputError(
             f"{effects!r:.80}", where=Argument("effects"), fix="give coefficients by name"
         )
+    acting = sorted(name for name, effect in EFFECTS.items() if scene in effect.scenes)
     for name, value in effects.items():
-        number = _as_number(value)
+        number = as_number(value)
         where = f"--effect {name}={value if math.isnan(number) else f'{number:g}'}"
-        if name not in EFFECTS:
-            raise InputError("unknown", where=where, fix=f"there are {', '.join(sorted(EFFECTS))}")
+        if name not in acting:
+            what = f"does not act in a {scene}" if name in EFFECTS else "unknown"
+            raise InputError(what, where=where, fix=f"there are {', '.join(acting)}")
         effect = EFFECTS[name]
         if not effect.lowest <= number <= effect.highest:
-            raise InputError(
-                f"{value!r:.80} is no coefficient of it",
-                where=where,
-                fix=f"give {name}=NUMBER, from {effect.lowest:g} to {effect.highest:g} in the unit "
-                f"{effect.unit}",
-            )
-        if scene not in effect.scenes:
-            raise InputError(f"does not act in a {scene}", where=where, fix="leave it out")
-    return {name: _as_number(value) for name, value in effects.items()}
+            ends = f"from {effect.lowest:g} to {effect.highest:g} in the unit {effect.unit}"
+            what = f"{value!r:.80} is no coefficient of it"
+            raise InputError(what, where=where, fix=f"give {name}=NUMBER, {ends}")
+    return {name: as_number(value) for name, value in effects.items()}

@@ -1,9 +1,9 @@
-"""Whether the stick's inclination and the gripper's positions are told in one frame.
+"""Whether the stick's inclination and the gripper's positions are told in one frame and one time.
 
-A cup is round, and a stick hangs freely. So the inclination xz + i yz, as a complex number,
-answers the gripper's x + i y by one real response in time, the same in all directions. A frame
-that is turned multiplies it by a phase. The wrong sign of one plane, or planes that are
-exchanged, conjugate it. Least squares find both, without any simulator.
+A cup is round, and a stick hangs freely. So both planes of the inclination answer x and y of the
+gripper by one real response in time. A fault of frame, camera or clock breaks that. Each is tried
+at all of its sizes by least squares, without any simulator, and found where it leaves much less of
+the inclination unexplained than the simpler ones do.
 """
 
 from collections.abc import Iterable, Iterator
@@ -12,79 +12,59 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .fields import PLANES
-from .recording import Recording
+from .recording import AXES, PLANES, Recording
 
-DELAYS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45)
+DELAYS = np.array([0.0, 0.05, 0.1, 0.2, 0.3, 0.45])
 """At which the inclination may follow the gripper [s]."""
 
-MIN_SAMPLES_PER_BLOCK = 5
-N_BLOCKS = 8
-"""Parts of a recording that are left out in turn, for the standard error of the turn."""
+MIN_SAMPLES = 40
+"""In which both planes are seen, before anything is concluded."""
 
 MIN_TRAVEL = 5e-3
 """Of the gripper, along its longer way [m], on which an inclination can be seen to follow."""
 
-MIN_FOLLOWED = 0.3
-"""Share of the inclination's variance that must follow the gripper before anything is concluded."""
+MAX_LEFT = 0.7
+"""Share of the inclination's variance that a fault may leave unexplained."""
 
-MAX_RESIDUAL_RATIO = 0.5
-"""Residual of the best frame over that of the worst, or of the unmirrored one: above it the path
-does not tell the frames apart, as on a circle, where a turn is a delay."""
+MIN_LEFT = 0.02
+"""Share that is left as it is: there is nothing to find below."""
 
-MIN_RESIDUAL_SHARE = 1e-3
-"""Of the inclination's variance: what is less is as good as nothing."""
+MAX_RATIO = 0.6
+"""Of what a fault leaves to what a simpler one leaves."""
 
 MAX_TURN_DEG = 15.0
 """Turn that is let pass: the swirl of a thin liquid turns the answer by up to 10 degrees."""
 
-MAX_TURN_ERRORS = 3.0
-"""Standard errors by which a turn must differ from none."""
+MAX_TIME = 12.0
+"""Time from the start in which faults are sought [s]."""
 
+TURNS_DEG = np.arange(-175.0, 181.0, 5.0)
+PLANE_TURNS_DEG = np.r_[-90.0:-MAX_TURN_DEG:5.0, 90.0:MAX_TURN_DEG:-5.0]
+PLANE_DELAYS = np.arange(0.05, 0.61, 0.05)  # s
+SCALES = (10.0, 57.3, 100.0, 1000.0)
+RATES = 1.02 ** np.r_[-35:-1, 2:36]  # true ones of pictures over those of their stamps
 
 CAUSES = {
     (False, 2): f"the signs (`flip`) of {' and '.join(PLANES)}, or of x and y, are wrong",
     (True, 0): f"the sign (`flip`) of {PLANES[1]}, or of y, is wrong",
-    (True, 1): "the planes are exchanged",
+    (True, 3): "the planes are exchanged",
     (True, 2): f"the sign (`flip`) of {PLANES[0]}, or of x, is wrong",
-    (True, 3): "the planes are exchanged, and their signs are wrong",
+    (True, 1): "the planes are exchanged, and their signs are wrong",
 }
 """What is likely wrong, by whether the frame is mirrored, and its turn in quarters."""
 
 
-class FrameRotation(NamedTuple):
-    """How the frame of the inclination lies to that of the positions.
+class Explanation(NamedTuple):
+    """A fault at one size.
 
     Attributes:
-        angle_deg: By which positions must be turned to fit, counterclockwise seen from above; of
-            a mirrored frame, after the sign of yz was changed. In (-180, 180].
-        error_deg: Its standard error.
-        mirrored: Whether one of the two is left-handed.
+        path: The gripper's x + i y at each sample and each delay before it that the inclination
+            answers if the fault is there, shape (T, delays).
+        text: Its description and remedy; "" of what is none.
     """
 
-    angle_deg: float
-    error_deg: float
-    mirrored: bool
-
-
-def found_turn(recording: Recording) -> FrameRotation | None:
-    """The turn of a recording's frame; None where its path does not tell it."""
-    path = recording.gripper.position[:, :2]
-    inclination = recording.inclination @ (1.0, 1j)
-    seen = np.isfinite(inclination)
-    travel = (np.nanmax(path, axis=0) - np.nanmin(path, axis=0)).max()
-    if travel < MIN_TRAVEL or seen.sum() < N_BLOCKS * MIN_SAMPLES_PER_BLOCK:
-        return None
-    delayed, inclination = _delayed(recording)[seen], inclination[seen]
-    straight, mirrored = _fit(inclination, delayed), _fit(inclination.conj(), delayed)
-    is_mirrored = mirrored.residual < MAX_RESIDUAL_RATIO * straight.residual
-    best = mirrored if is_mirrored else straight
-    if best.residual > MAX_RESIDUAL_RATIO * best.worst or best.followed < MIN_FOLLOWED:
-        return None
-    followed = inclination.conj() if is_mirrored else inclination
-    return FrameRotation(
-        float(np.degrees(best.angle)), _error_deg(followed, delayed, best.angle), is_mirrored
-    )
+    path: NDArray[np.complex128]
+    text: str
 
 
 def recording_warnings(recordings: Iterable[Recording]) -> list[str]:
@@ -107,76 +87,127 @@ def named_faults(recordings: Iterable[Recording]) -> tuple[str, ...]:
 
 def frame_faults(recording: Recording) -> Iterator[str]:
     """What is wrong with the frame of a recording; nothing where none is found."""
-    turn = found_turn(recording)
-    if turn is None:
+    start = recording.time[0] if len(recording.time) else 0.0
+    part = recording.first(int(np.searchsorted(recording.time, start + MAX_TIME)))
+    position = part.gripper.position[:, :2]
+    if np.isfinite(part.inclination).all(axis=1).sum() < MIN_SAMPLES:
         return
-    angle, error = turn.angle_deg, turn.error_deg
-    if not turn.mirrored and abs(angle) <= max(MAX_TURN_DEG, MAX_TURN_ERRORS * error):
+    if (np.nanmax(position, axis=0) - np.nanmin(position, axis=0)).max() < MIN_TRAVEL:
         return
-    quarters = round(angle / 90.0)
-    near = abs(angle - 90.0 * quarters) <= MAX_TURN_DEG
-    cause = CAUSES.get((turn.mirrored, quarters % 4)) if near else None
-    mirrored = "mirrored and " if turn.mirrored else ""
-    flip = f" after `flip` of {PLANES[1]}" if turn.mirrored else ""
-    yield (
-        f"the inclination is {mirrored}turned by {round(angle)} +- {round(error)} deg against x "
-        f"and y: {cause or f'add {round(angle)} to `yaw_deg`{flip}'}; "
+    path = _delayed(part, part.time)
+    turns = [_residual(part, one.path)[0] for one in _turns(path)]
+    if MAX_RATIO * max(turns) < min(turns) < MAX_LEFT:
+        return  # on a circle a turn is a delay
+    least, fault = _left(part, path), ""
+    for explanations in (_turns(path), _mirrors(path), _camera_faults(part, path)):
+        if least <= MIN_LEFT:
+            break
+        tried = [(_left(part, one.path), one.text) for one in explanations]
+        left, text = min(tried, key=lambda one: one[0])
+        if left < min(MAX_LEFT, MAX_RATIO * least):
+            least, fault = left, text
+    if fault:
+        yield fault
+
+
+def _turns(path: NDArray[np.complex128]) -> Iterator[Explanation]:
+    """The inclination's frame is turned; a small turn is no fault."""
+    for turn in TURNS_DEG:
+        small = abs(turn) <= MAX_TURN_DEG
+        yield Explanation(_turned(path, turn), "" if small else _frame_text(turn, False))
+
+
+def _mirrors(path: NDArray[np.complex128]) -> Iterator[Explanation]:
+    """One of the two frames is left-handed."""
+    for turn in TURNS_DEG:
+        yield Explanation(_turned(path, turn).conj(), _frame_text(turn, True))
+
+
+def _frame_text(turn: float, mirrored: bool) -> str:
+    """A turn [deg] of the whole frame; of a mirrored one, after the sign of yz was changed."""
+    quarters = round(turn / 90.0)
+    near = abs(turn - 90.0 * quarters) <= MAX_TURN_DEG
+    cause = CAUSES.get((mirrored, quarters % 4)) if near else None
+    flip = f" after `flip` of {PLANES[1]}" if mirrored else ""
+    return (
+        f"the inclination is {'mirrored and ' if mirrored else ''}turned by {turn:g} deg against "
+        f"x and y: {cause or f'add {turn:g} to `yaw_deg`{flip}'}; "
         "correct the map of `bolfi-liquids import`, or the axes of the rig"
     )
 
 
-def _delayed(recording: Recording) -> NDArray[np.complex128]:
-    """The gripper's x + i y at each sample, and each delay before it, shape (T, delays)."""
-    time, way = recording.time, 0.0
-    for axis, factor in zip(recording.gripper.position.T[:2], (1.0, 1j), strict=True):
-        known = np.isfinite(axis)
-        before = [np.interp(time - delay, time[known], axis[known]) for delay in DELAYS]
-        way = way + factor * np.stack(before, axis=-1)
-    return np.asarray(way)
+def _camera_faults(recording: Recording, path: NDArray[np.complex128]) -> Iterator[Explanation]:
+    """One plane is late, turned or in another unit, or pictures have stamps of another rate."""
+    time = recording.time
+    for plane, other in (PLANES, PLANES[::-1]):
+        for late in PLANE_DELAYS:
+            text = f"{plane} comes {late:.2g} s later than {other}: shift the stamps of either"
+            yield Explanation(_of_plane(plane, _delayed(recording, time - late), path), text)
+        for turn in PLANE_TURNS_DEG:
+            text = (
+                f"{plane} alone is turned by {turn:.0f} deg, which no turn of x and y mends: "
+                "correct where its camera stands, or calibrate it again"
+            )
+            yield Explanation(_of_plane(plane, _turned(path, turn), path), text)
+        for scale in SCALES:
+            text = (
+                f"{plane} over {AXES[PLANES.index(plane)]} is {scale:g} times that of {other}: "
+                "correct the unit of one of them"
+            )
+            yield Explanation(_of_plane(plane, scale * path, path), text)
+    usual = 1.0 / float(np.median(np.diff(time)))
+    for rate in RATES:
+        text = (
+            f"the inclination follows as in pictures taken at {usual * rate:.3g} Hz, and is given "
+            f"at {usual:.3g} Hz: stamp each picture with the time at which it was taken"
+        )
+        yield Explanation(_delayed(recording, time[0] + (time - time[0]) / rate), text)
 
 
-class _RotationFit(NamedTuple):
-    """Angle [rad]; residual sums of squares at it and at its worst; share that it explains."""
+def _delayed(recording: Recording, time: NDArray) -> NDArray[np.complex128]:
+    """The gripper's x + i y at each of the times (T,) and each delay before, (T, delays)."""
+    before = time[:, None] - DELAYS
+    known = np.isfinite(recording.gripper.position)
+    x, y = (
+        np.interp(before, recording.time[known[:, k]], recording.gripper.position[known[:, k], k])
+        for k in range(2)
+    )
+    return x + 1j * y
 
-    angle: float
-    residual: float
-    worst: float
-    followed: float
+
+def _turned(path: NDArray[np.complex128], turn_deg: float) -> NDArray[np.complex128]:
+    return np.exp(1j * np.radians(turn_deg)) * path
 
 
-def _fit(inclination: NDArray, delayed: NDArray) -> _RotationFit:
-    """Inclination = phase x (real response to the delayed positions).
+def _of_plane(
+    plane: str, changed: NDArray[np.complex128], path: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """The path, changed for one plane alone."""
+    if plane == PLANES[0]:
+        return changed.real + 1j * path.imag
+    return path.real + 1j * changed.imag
 
-    Turned back by an angle, the inclination is linear in its cosine and sine, and so is what a real
-    response leaves of it: the best angle is the eigenvector of a 2 x 2 matrix.
+
+def _left(recording: Recording, path: NDArray[np.complex128]) -> float:
+    """Share of the variance that a response to a path leaves: all if the stick would lead it."""
+    share, trails = _residual(recording, path)
+    return share if trails else 1.0
+
+
+def _residual(recording: Recording, path: NDArray[np.complex128]) -> tuple[float, bool]:
+    """Fit of one response of both planes to a path (T, delays).
+
+    Returns:
+        Share of the planes' variance that it leaves; and whether the stick trails what the gripper
+        has moved of late, even where it swings in a thin liquid.
     """
-    seen, way = inclination - inclination.mean(), delayed - delayed.mean(axis=0)
-    design = np.vstack([way.real, way.imag])
-    turned = np.column_stack([_real(seen), _real(-1j * seen)])
-    left = turned - design @ np.linalg.lstsq(design, turned, rcond=None)[0]
-    (least, most), vectors = np.linalg.eigh(left.T @ left)
-    angle = float(np.arctan2(vectors[1, 0], vectors[0, 0]))
-    power = max(float(np.sum(np.abs(seen) ** 2)), np.finfo(float).tiny)
-    floor = MIN_RESIDUAL_SHARE * power
-    # the stick trails what the gripper has moved of late, even where it swings in a thin liquid
-    moved = way[:, 0] - way.mean(axis=1)
-    if np.sum(np.exp(-1j * angle) * seen * moved.conj()).real > 0.0:
-        angle += np.pi
-    wrapped = float(np.pi - (np.pi - angle) % (2.0 * np.pi))
-    residual, worst = (max(float(value), floor) for value in (least, most))
-    return _RotationFit(wrapped, residual, worst, 1.0 - residual / power)
-
-
-def _real(values: NDArray) -> NDArray:
-    return np.concatenate([np.real(values), np.imag(values)])
-
-
-def _error_deg(inclination: NDArray, delayed: NDArray, angle: float) -> float:
-    """Standard error of the angle, by a jackknife over stretches: what is left is correlated."""
-    blocks = np.arange(len(inclination)) * N_BLOCKS // len(inclination)
-    apart = [
-        _fit(inclination[blocks != block], delayed[blocks != block]).angle - angle
-        for block in range(N_BLOCKS)
-    ]
-    wrapped = np.degrees((np.array(apart) + np.pi) % (2.0 * np.pi) - np.pi)
-    return float(np.sqrt((N_BLOCKS - 1) / N_BLOCKS * np.sum((wrapped - wrapped.mean()) ** 2)))
+    designs, angles = [], []
+    for way, plane in zip((path.real, path.imag), recording.inclination.T, strict=True):
+        seen = np.isfinite(plane)
+        designs.append(way[seen] - way[seen].mean(axis=0))
+        angles.append(plane[seen] - plane[seen].mean())
+    design, angle = np.concatenate(designs), np.concatenate(angles)
+    response = np.linalg.lstsq(design.T @ design, design.T @ angle, rcond=1e-12)[0]
+    whole = max(float(angle @ angle), np.finfo(float).tiny)
+    moved = design[:, 0] - design.mean(axis=1)
+    return float(np.sum((angle - design @ response) ** 2)) / whole, bool(angle @ moved <= 0.0)

@@ -1,16 +1,16 @@
 """Recordings are read from their files and checked."""
 
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from ..files import existing_file
 from .checks import check_values
-from .fields import check_fields
-from .recording import Recording, as_recording
+from .recording import REQUIRED, STICK_WEIGHT, UNITS, Recording, as_recording
 from .start import check_start
+from .toml_file import opened
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -27,6 +27,13 @@ DAMAGE = (
     MemoryError,
 )
 """What the libraries that read NetCDF raise where bytes of a file are wrong."""
+
+SPELLINGS = {
+    "s": ("s", "sec", "second", "seconds"),
+    "m": ("m", "metre", "metres", "meter", "meters"),
+    "rad": ("rad", "radian", "radians"),
+}
+"""Of each unit, as files have them."""
 
 Source = Recording | str | Path
 
@@ -77,16 +84,7 @@ def open_recordings(
     """
     if isinstance(sources, Source) or not isinstance(sources, Iterable):
         sources = [sources]
-    opened = []
-    for one in sources:
-        if not isinstance(one, Source):
-            raise InputError(
-                f"{one!r:.80} is no recording",
-                where=option,
-                fix="give paths of NetCDF files, or what open_recording returns",
-            )
-        opened.append(one if isinstance(one, Recording) else open_recording(one))
-    return opened
+    return [opened(one, Recording, open_recording, option, "recording") for one in sources]
 
 
 def read_fields(content: bytes, path: Path) -> "Dataset":
@@ -112,5 +110,32 @@ def read_fields(content: bytes, path: Path) -> "Dataset":
         dataset = xarray.load_dataset(io.BytesIO(content), decode_times=False)
     except DAMAGE as err:
         raise InputError("damaged, cannot be read", where=str(path), fix="copy it again") from err
-    check_fields(dataset, path)
+    for field, what, fix in _field_faults(dataset):
+        raise InputError(what, where=f"{path}: {field}", fix=fix)
     return dataset
+
+
+def _field_faults(dataset: "Dataset") -> Iterator[tuple[str, str, str]]:
+    """Field, fault and remedy of what is not there, or not in SI units."""
+    held = ", ".join(sorted(map(str, dataset.variables))) or "no variables"
+    if missing := [name for name in UNITS if name not in dataset.variables]:
+        needed = f"a recording needs {', '.join(UNITS)}"
+        yield ", ".join(missing), f"missing (the file holds {held})", needed
+    for name, si in UNITS.items():
+        variable = dataset[name]
+        unit = str(variable.attrs.get("units", si))
+        if variable.dims != ("time",):
+            yield name, f"has dimensions {variable.dims}", "it must have the dimension time"
+        elif " since " in unit:
+            since = f"store the time since the first sample in {si}, as float64"
+            yield name, f"holds dates, {variable.dtype} in {unit!r}", since
+        elif variable.dtype.kind != "f":  # complex and whole numbers have lost a part
+            what = f"holds {variable.dtype} in {unit!r}, not decimal numbers"
+            yield name, what, f"store it in {si}, as float64"
+        elif unit not in SPELLINGS[si]:
+            yield name, f"has units {unit!r}", f"convert it to {si} and set units to {si!r}"
+    missing = [name for name in REQUIRED if name not in dataset.attrs]
+    if not any(name in dataset.attrs for name in STICK_WEIGHT):
+        missing.append(" or ".join(STICK_WEIGHT))
+    if missing:
+        yield f"attribute {', '.join(missing)}", "missing", "add it to the file, in SI units"

@@ -13,29 +13,40 @@ from numpy.typing import NDArray
 
 from ..errors import Argument, InputError
 from .cups import cups_of
+from .limits import ABOVE_0, INF, Limits
 from .table import Table, is_number, read_table
+from .toml_file import opened
 
 if TYPE_CHECKING:
     from ..models import Cups
 
 logger = logging.getLogger(__name__)
 
-RANGES = {
-    "angular_velocity_deg_s": (1.0, 1000.0),
-    "distance_cm": (-20.0, 50.0),
-    "spilled": (0.0, np.inf),
-    "received": (0.0, np.inf),
-    "retained": (0.0, np.inf),
+CELL = "correct the cell, or remove the line"
+ACTIONS = {
+    "angular_velocity_deg_s": Limits("", 1.0, 1000.0, "deg/s", CELL),
+    "distance_cm": Limits("", -20.0, 50.0, "cm", CELL),
 }
-"""Columns of a table and their limits: what a robot can do, and amounts in any one unit."""
+"""Columns of what a robot did, and its limits."""
 
-ANGULAR_VELOCITY, DISTANCE, *AMOUNTS = RANGES
+ANGULAR_VELOCITY, DISTANCE = ACTIONS
+AMOUNTS = ("spilled", "received", "retained")
 LIQUID = "liquid"
-MIN_POURS = 3  # from which anything can be learned
+MAX_DRIFT = 0.005
+"""Of a pour's amount, by which a scale may have drifted below 0, which then counts as 0."""
 MAX_TIMES_BEYOND = 4.0  # that a pour may be faster or slower than the cups' range
 MAX_TIMES_TOTAL = 10.0  # that a pour may be more or less than the usual one of its table
 ROUNDING = 1e-9  # relative, of an action at an end of the cups' range
 MIN_DISTANCE_SHARE = 0.02  # of the cups' longest; a table whose distances all are shorter is in m
+
+ENOUGH = Limits("number of pours", 3, INF, "", "give more: fewer teach nothing")
+DRIFT = Limits(
+    "a scale's drift below 0 over the pour's amount",
+    0.0,
+    MAX_DRIFT,
+    "",
+    "set the scale to 0 and weigh again, or remove the line",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,35 +108,47 @@ def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:
         InputError: The file is missing or cannot be used; the message names file, line, column
             and value.
     """
-    table = read_table(path, RANGES)
-    if missing := [name for name in RANGES if not table.has(name)]:
-        raise InputError(
-            f"has no column {', '.join(missing)}",
-            where=str(table.path),
-            fix=f"give a column for each of {', '.join(RANGES)}",
-        )
+    names = (*ACTIONS, *AMOUNTS)
+    table = read_table(path, names)
+    table.require(names, f"give a column for each of {', '.join(names)}")
     table, liquid = _of_liquid(table, liquid)
-    if len(table.lines) < MIN_POURS:
-        raise InputError(
-            f"too few pours: {len(table.lines)}",
-            where=str(table.path),
-            fix=f"give at least {MIN_POURS} of them",
-        )
-    values = {name: _within(table, name, *ends) for name, ends in RANGES.items()}
-    amounts = np.stack([values[name] for name in AMOUNTS], axis=1)
-    total = amounts.sum(axis=1, keepdims=True)
-    _check_totals(table, total[:, 0])
-    if unused := table.others((*RANGES, LIQUID)):
+    ENOUGH.check(len(table.lines), str(table.path))
+    values = {name: table.numbers(name, complete=True) for name in names}
+    for name, limits in ACTIONS.items():
+        for line, value in zip(table.lines, values[name], strict=True):
+            limits.check(value, table.where(line, name))
+    amounts = _amounts(table, values)
+    if unused := table.others((*names, LIQUID)):
         logger.warning("%s: columns not used: %s", table.path, ", ".join(unused))
     return PourTable(
         path=table.path,
         liquid=liquid,
         angular_velocity=np.radians(values[ANGULAR_VELOCITY]),
         distance=values[DISTANCE] / 100.0,
-        fractions=amounts / total,
+        fractions=amounts / amounts.sum(axis=1, keepdims=True),
         lines=np.asarray(table.lines),
         hash=hashlib.sha256(table.path.read_bytes()).hexdigest(),
     )
+
+
+def _amounts(table: Table, values: dict[str, NDArray]) -> NDArray[np.float64]:
+    """Spilled, received and retained of each pour in the table's unit, shape (rows, 3).
+
+    Raises:
+        InputError: One is beyond a scale's drift below 0, or all of a pour are quite
+            another amount than the others': a slip of the pen or of the unit.
+    """
+    amounts = np.stack([values[name] for name in AMOUNTS], axis=1)
+    totals = amounts.sum(axis=1)
+    usual = max(float(np.median(totals)), ABOVE_0)
+    ends = max(usual / MAX_TIMES_TOTAL, ABOVE_0), usual * MAX_TIMES_TOTAL
+    whole = Limits(f"{', '.join(AMOUNTS)} in all", *ends, "", "weigh all in one unit")
+    for line, row, total in zip(table.lines, amounts, totals, strict=True):
+        for name, value in zip(AMOUNTS, row, strict=True):
+            drift = max(-value, 0.0) / max(abs(total), usual)
+            DRIFT.check(drift, table.where(line, name), f" ({value:g})")
+        whole.check(total, f"{table.path}: line {line}", f" (usually {usual:g})")
+    return np.maximum(amounts, 0.0)
 
 
 def table_of(given: Pours | None, where: str) -> PourTable | None:
@@ -134,13 +157,7 @@ def table_of(given: Pours | None, where: str) -> PourTable | None:
     Raises:
         InputError: Something else was given, or the file cannot be used.
     """
-    if given is not None and not isinstance(given, Pours):
-        raise InputError(
-            f"{given!r:.80} is no table of pours",
-            where=where,
-            fix="give the path of a CSV file, or what open_pours returns",
-        )
-    return open_pours(given) if isinstance(given, str | Path) else given
+    return None if given is None else opened(given, PourTable, open_pours, where, "table of pours")
 
 
 def table_and_cups(
@@ -160,10 +177,10 @@ def table_and_cups(
         raise InputError(
             "there are no pours from them", where=Argument("cups"), fix="give `pours`, too"
         )
-    opened = cups_of(cups)
+    made_with = cups_of(cups)
     if table is not None:
-        check_scene(table, opened)
-    return table, opened
+        check_scene(table, made_with)
+    return table, made_with
 
 
 def check_scene(table: PourTable, cups: "Cups") -> None:
@@ -175,42 +192,42 @@ def check_scene(table: PourTable, cups: "Cups") -> None:
     for rate, distance in zip(table.angular_velocity, table.distance, strict=True):
         check_rate(float(rate), cups, f"{table.path}: {ANGULAR_VELOCITY}")
         check_distance(float(distance), cups, f"{table.path}: {DISTANCE}")
-    longest = float(np.abs(table.distance).max())
-    least = MIN_DISTANCE_SHARE * max(map(abs, cups.distance_range))
-    if 0.0 < longest < least:
-        raise InputError(
-            f"the longest is {100.0 * longest:g} cm, at least {100.0 * least:g} cm is expected",
-            where=f"{table.path}: {DISTANCE}",
-            fix="give the distances in cm",
-        )
+    longest = 100.0 * float(np.abs(table.distance).max())
+    least = 100.0 * MIN_DISTANCE_SHARE * max(map(abs, cups.distance_range))
+    if longest > 0.0:
+        limits = Limits("longest", least, INF, "cm", "give the distances in cm")
+        limits.check(longest, f"{table.path}: {DISTANCE}")
 
 
 def check_distance(distance: float, cups: "Cups", where: str) -> None:
     """Raise `InputError` for a distance [m] at which the receiver of these cups cannot stand."""
-    low, high = cups.distance_range
-    beyond = max(high - low, 2.0 * cups.receiver.radius)
-    if low - beyond <= distance <= high + beyond:
-        return
-    raise InputError(
-        f"{100.0 * distance:g} cm; the cups stand {100.0 * low:g} to {100.0 * high:g} cm apart",
-        where=where,
-        fix="give the distance from the lip to the receiver's axis in cm, or the cups that were "
-        f"poured with{_in_python('m', where)}",
+    low, high = (100.0 * end for end in cups.distance_range)
+    beyond = max(high - low, 200.0 * cups.receiver.radius)
+    cause = f"the cups stand {low:g} to {high:g} cm apart"
+    fix = (
+        "give the distance from the lip to the receiver's axis in cm, or the cups that were "
+        f"poured with{_in_python('m', where)}"
     )
+    limits = Limits(cause, low - beyond, high + beyond, "cm", fix)
+    _check_action(100.0 * distance, limits, where)
 
 
 def check_rate(rate: float, cups: "Cups", where: str) -> None:
     """Raise `InputError` for an angular velocity [rad/s] far from those of these cups."""
-    low, high = cups.angular_velocity_range
-    if low / MAX_TIMES_BEYOND <= rate <= high * MAX_TIMES_BEYOND:
-        return
-    given, slow, fast = np.degrees([rate, low, high])
-    raise InputError(
-        f"{given:g} deg/s; the cups are turned at {slow:g} to {fast:g} deg/s",
-        where=where,
-        fix="give the angular velocity in deg/s, or the cups that were poured with"
-        + _in_python("rad/s", where),
-    )
+    given, slow, fast = map(float, np.degrees([rate, *cups.angular_velocity_range]))
+    cause = f"the cups are turned at {slow:g} to {fast:g} deg/s"
+    fix = "give the angular velocity in deg/s, or the cups that were poured with"
+    ends = slow / MAX_TIMES_BEYOND, fast * MAX_TIMES_BEYOND
+    limits = Limits(cause, *ends, "deg/s", f"{fix}{_in_python('rad/s', where)}")
+    _check_action(given, limits, where)
+
+
+def _check_action(value: float, limits: Limits, where: str) -> None:
+    """Raise `InputError` beyond limits that follow from the cups, with the cause."""
+    cause, least, most, unit, fix = limits
+    if not least <= value <= most:
+        what = f"{value:g} {unit}; {cause}, {least:g} to {most:g} {unit} are allowed"
+        raise InputError(what, where=where, fix=fix)
 
 
 def _in_python(unit: str, where: str) -> str:
@@ -233,12 +250,12 @@ def _of_liquid(table: Table, liquid: str | None) -> tuple[Table, str]:
             where=str(table.path),
             fix="say whose to take by `liquid`",
         )
-    return replace(table, lines=table.lines[of == liquid], cells=table.cells[of == liquid]), liquid
+    return table.rows(of == liquid), liquid
 
 
 def _check_remarks(table: Table) -> None:
     """Refuse a liquid column that would be ignored: a name like it over no measurement."""
-    others = table.others(RANGES)
+    others = table.others((*ACTIONS, *AMOUNTS))
     for name, cells in zip(table.header, table.cells.T, strict=True):
         held = [cell for cell in cells if cell]
         if name not in others or not held or all("." in cell and is_number(cell) for cell in held):
@@ -250,32 +267,3 @@ def _check_remarks(table: Table) -> None:
                 where=f"{table.path}: header",
                 fix=f"name it {LIQUID!r} where it says of which liquid a pour is, else otherwise",
             )
-
-
-def _within(table: Table, name: str, least: float, most: float) -> NDArray[np.float64]:
-    """Numbers of a column, none of which may be missing or outside of its limits."""
-    values = table.numbers(name)
-    wrong = ~((values >= least) & (values <= most))
-    if wrong.any():
-        at = int(wrong.argmax())
-        raise InputError(
-            f"{table.column(name)[at]!r} is not between {least:g} and {most:g}",
-            where=table.where(table.lines[at], name),
-            fix="correct or remove the line; what a scale shows below 0 is 0",
-        )
-    return values
-
-
-def _check_totals(table: Table, total: NDArray) -> None:
-    """Refuse pours of quite another amount than the others: a slip of the pen or of the unit."""
-    usual = float(np.median(total))
-    least, most = usual / MAX_TIMES_TOTAL, usual * MAX_TIMES_TOTAL
-    wrong = (total <= 0.0) | (total < least) | (total > most)
-    if wrong.any():
-        at = int(wrong.argmax())
-        raise InputError(
-            f"{', '.join(AMOUNTS)} are {total[at]:g} in all, where the pours of this table are "
-            f"usually {usual:g}, {least:g} to {most:g} allowed",
-            where=f"{table.path}: line {table.lines[at]}",
-            fix="give all in one unit, and weigh what was poured",
-        )

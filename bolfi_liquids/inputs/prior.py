@@ -1,9 +1,12 @@
 """The prior of the liquid's parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..errors import InputError
+from .described_liquid import MAX_VISCOSITY
 
 if TYPE_CHECKING:
     from numpyro.distributions import Distribution
@@ -13,7 +16,12 @@ if TYPE_CHECKING:
 Described = Mapping[str, Any]
 """Family and arguments of a distribution: texts, numbers, and such a table for another one."""
 
-PARAMETERS = ("viscosity", "cohesion")
+PARAMETERS = {"viscosity": (0.0, MAX_VISCOSITY), "cohesion": (0.0, 1.0)}
+"""The simulator's parameters, and where it is defined."""
+
+TAIL = 1e-3
+"""Mass of a prior that may lie beyond on either side."""
+
 TRUNCATED = (
     "LeftTruncatedDistribution",
     "RightTruncatedDistribution",
@@ -62,44 +70,42 @@ def read_prior(described: Mapping[str, Described]) -> "Prior":
 
 
 def check_prior(prior: "Prior") -> None:
-    """Raise `InputError` unless the prior is over the simulator's parameters, and can be kept."""
+    """Raise `InputError` unless a prior is over the simulator's parameters, and can be kept."""
+    for where, what, fix in _faults(prior):
+        raise InputError(what, where=where, fix=fix)
+
+
+def _faults(prior: Any) -> Iterator[tuple[str, str, str]]:
+    """Place, fault and remedy of what speaks against a prior."""
     from ..inference import Prior
 
-    if not isinstance(prior, Prior):
-        raise InputError(
-            f"{type(prior).__name__}, expected inference.Prior",
-            where="prior",
-            fix='give inference.Prior({"viscosity": ..., "cohesion": ...})',
-        )
-    if set(prior.names) != set(PARAMETERS):
-        raise InputError(
-            f"parameters {', '.join(prior.names)}, expected {', '.join(PARAMETERS)}",
-            where="prior",
-            fix="give one distribution for each of them",
-        )
+    given = ", ".join(prior.names) if isinstance(prior, Prior) else type(prior).__name__
+    if not isinstance(prior, Prior) or set(prior.names) != set(PARAMETERS):
+        fix = 'give inference.Prior({"viscosity": ..., "cohesion": ...})'
+        yield "prior", f"{given}, expected inference.Prior of {', '.join(PARAMETERS)}", fix
+    tails = np.array([[TAIL], [1.0 - TAIL]])
     for name, distribution in prior.distributions.items():
-        _check_kept(name, distribution)
+        family, (least, most) = type(distribution).__name__, PARAMETERS[name]
+        low, high = Prior({name: distribution}).from_unit(tails)[name]
+        if not least <= low <= high <= most:
+            what = f"{family} goes from {low:.3g} to {high:.3g}"
+            fix = f"give one within {least:g} to {most:g}, such as a LogUniform or TruncatedNormal"
+            yield f"prior of {name}", what, fix
+        if not _is_kept(name, distribution):
+            fix = "give another, such as LogUniform, Uniform, TruncatedNormal, LogNormal or Beta"
+            yield f"prior of {name}", f"{family} cannot be written down by its numbers", fix
 
 
-def _check_kept(name: str, distribution: "Distribution") -> None:
-    """Raise `InputError` unless a distribution is the same after it was written down and read."""
-    import numpy as np
-
+def _is_kept(name: str, distribution: "Distribution") -> bool:
+    """Whether a distribution is the same after it was written down and read."""
     from ..inference import Prior
 
     u = np.linspace(0.01, 0.99, 9)[:, None]
     try:
         again = read_prior({name: _described(distribution)}).from_unit(u)[name]
-        same = np.allclose(again, Prior({name: distribution}).from_unit(u)[name], rtol=1e-5)
     except (AttributeError, TypeError, ValueError):
-        same = False
-    if not same:
-        raise InputError(
-            f"{type(distribution).__name__} cannot be written down by its numbers",
-            where=f"prior of {name}",
-            fix="give another, such as LogUniform, Uniform, Normal, TruncatedNormal, LogNormal, "
-            "Beta or Gamma",
-        )
+        return False
+    return bool(np.allclose(again, Prior({name: distribution}).from_unit(u)[name], rtol=1e-5))
 
 
 def _described(distribution: "Distribution") -> Described:

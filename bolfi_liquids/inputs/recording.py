@@ -13,12 +13,21 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..wording import html_table
-from .fields import AXES, DENSITIES, LENGTHS, PLANES, UNITS
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
     from xarray import Dataset
 
+AXES = ("x", "y", "z")
+PLANES = ("inclination_xz", "inclination_yz")
+PLANE_NAMES = ("xz", "yz")
+UNITS = {"time": "s", **dict.fromkeys(AXES, "m"), **dict.fromkeys(PLANES, "rad")}
+"""Variables of a recording's file, in its order, and their units."""
+
+LENGTHS = ("cup_radius", "cup_height", "fill", "stick_radius", "stick_length")
+REQUIRED = (*LENGTHS, "liquid_density")
+STICK_WEIGHT = ("stick_density", "stick_mass")
+"""Attributes of which one is needed."""
 
 SUBJECTS = {
     "cup": ("cup_radius", "cup_height", "fill"),
@@ -134,7 +143,7 @@ def recording_dataset(values: Mapping[str, NDArray], attrs: Mapping[str, float |
     """
     from xarray import Dataset
 
-    samples = {name: ("time", values[name], {"units": units[0]}) for name, units in UNITS.items()}
+    samples = {name: ("time", values[name], {"units": unit}) for name, unit in UNITS.items()}
     return Dataset(samples, attrs=attrs).set_coords("time")
 
 
@@ -160,9 +169,9 @@ def planned_recording(
             where="planned path",
             fix="give (T,) increasing times in s and (T, 3) finite positions in m",
         )
-    for name in DENSITIES:
-        if name not in attrs:
-            raise InputError("missing", where=f"plan: attribute {name}", fix="weigh the liquid")
+    if "liquid_density" not in attrs:
+        where = "plan: attribute liquid_density"
+        raise InputError("missing", where=where, fix="weigh the liquid")
     unseen = np.full((len(time), 2), np.nan)
     path = Trajectory(time, position)
     return Recording(time, path, unseen, dict(attrs), Path("plan"), "")
@@ -171,7 +180,7 @@ def planned_recording(
 def along_path(recording: Recording, inclination: NDArray) -> dict[str, NDArray]:
     """Values of a recording's file: another inclination (T, 2) [rad] on the same path."""
     columns = [recording.time, *recording.gripper.position.T, *np.asarray(inclination).T]
-    return dict(zip(("time", *AXES, *PLANES), columns, strict=True))
+    return dict(zip(UNITS, columns, strict=True))
 
 
 def as_recording(dataset: "Dataset", path: Path, content: bytes) -> Recording:
@@ -208,7 +217,8 @@ def torn_values(values: NDArray, jump: float) -> NDArray[np.bool_]:
     """Which values lie far from both of their neighbours, while these agree.
 
     Args:
-        values: Shape (T,); NaN where one is missing, which has no neighbour.
+        values: Shape (T,); NaN where one is missing, which is no neighbour. Those of an end are the
+            next two.
         jump: Smallest distance from the neighbours.
 
     Returns:
@@ -216,9 +226,12 @@ def torn_values(values: NDArray, jump: float) -> NDArray[np.bool_]:
     """
     torn = np.zeros(len(values), bool)
     known = np.flatnonzero(np.isfinite(values))
-    before, value, after = (values[known[at : len(known) - 2 + at]] for at in range(3))
+    if len(known) < 3:
+        return torn
+    value = values[known]
+    before, after = np.r_[value[2], value[:-1]], np.r_[value[1:], value[-3]]
     agree = np.abs(after - before) < 0.5 * jump
-    torn[known[1:-1]] = agree & (np.abs(value - before) > jump) & (np.abs(after - value) > jump)
+    torn[known] = agree & (np.abs(value - before) > jump) & (np.abs(after - value) > jump)
     return torn
 
 
@@ -230,7 +243,7 @@ def _without_torn(values: dict[str, NDArray]) -> tuple[str, ...]:
         return ()
     told = []
     for name, at in torn.items():
-        unit = UNITS[name][0]
+        unit = UNITS[name]
         for sample in np.flatnonzero(at):
             told.append(
                 f"{name}: {values[name][sample]:.6g} {unit} of sample {sample} "

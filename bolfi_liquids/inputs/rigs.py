@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import InputError
+from .toml_file import opened
 
 if TYPE_CHECKING:
     from ..hardware import Rig
@@ -21,10 +21,4 @@ def rig_of(given: "Rig | str | Path | None") -> "Rig":
 
     if given is None:
         return bundled_rig()
-    if isinstance(given, str | Path):
-        return open_rig(given)
-    if not isinstance(given, Rig):
-        raise InputError(
-            f"{given!r:.80} is no rig", where="rig", fix="give the path of a rig.toml, or a Rig"
-        )
-    return checked_rig(given)
+    return checked_rig(opened(given, Rig, open_rig, "rig", "rig"))

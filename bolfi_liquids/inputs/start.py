@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..wording import command
-from .fields import PLANE_NAMES
-from .recording import Recording, steps
+from .recording import PLANE_NAMES, Recording, steps
 
 FIRST_TIME = 0.15
 """Time from which the speed at the start is extrapolated [s]."""

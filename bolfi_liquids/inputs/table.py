@@ -14,7 +14,7 @@ import math
 import re
 import zipfile
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -64,46 +64,60 @@ class Table:
         known = {_plain(name) for name in names}
         return tuple(one for one in self.header if one and _plain(one) not in known)
 
-    def column(self, name: str, fix: str = "correct the header") -> NDArray[np.object_]:
-        """Texts of a column, shape (rows,); upper case and blanks of its name do not matter.
+    def require(self, names: Iterable[str], fix: str = "correct the header") -> None:
+        """Refuse a table in which not each name is that of one column.
 
         Raises:
-            InputError: No column, or more than one, has this name; `fix` is what to do then.
+            InputError: Names of no column, all of them, or of several; `fix` is what to do then.
         """
-        exact = [at for at, one in enumerate(self.header) if one == name]
-        found = exact or [at for at, one in enumerate(self.header) if _plain(one) == _plain(name)]
-        if len(found) == 1:
-            return self.cells[:, found[0]]
-        where = f"{self.path}: header"
-        if found:
-            raise InputError(
-                f"{len(found)} columns are named {name!r}", where=where, fix="give each its own"
+        counts = {name: len(self._places(name)) for name in names}
+        if all(count == 1 for count in counts.values()):
+            return
+        told = [
+            f"{count} columns are named {name!r}" for name, count in counts.items() if count > 1
+        ]
+        if missing := [name for name, count in counts.items() if not count]:
+            likely = {name: get_close_matches(name, self.header, n=1) for name in missing}
+            meant = [f"{close[0]!r} for {name!r}" for name, close in likely.items() if close]
+            question = f"; did you mean {', '.join(meant)}?" if meant else ""
+            told.append(
+                f"no column {', '.join(map(repr, missing))} among "
+                f"{', '.join(map(repr, self.header)) or 'none'} (delimiter {self.delimiter!r})"
+                f"{question}"
             )
-        close = get_close_matches(name, self.header, n=1, cutoff=0.6)
-        likely = f"; did you mean {close[0]!r}?" if close else ""
-        raise InputError(
-            f"no column {name!r} among {', '.join(map(repr, self.header)) or 'none'} "
-            f"(delimiter {self.delimiter!r}){likely}",
-            where=where,
-            fix=fix,
-        )
+        raise InputError("; ".join(told), where=f"{self.path}: header", fix=fix)
+
+    def _places(self, name: str) -> list[int]:
+        """Columns of this name; upper case and blanks do not matter unless one has it exactly."""
+        exact = [at for at, one in enumerate(self.header) if one == name]
+        return exact or [at for at, one in enumerate(self.header) if _plain(one) == _plain(name)]
+
+    def column(self, name: str) -> NDArray[np.object_]:
+        """Texts of a column, shape (rows,).
+
+        Raises:
+            InputError: No column, or more than one, has this name.
+        """
+        self.require([name])
+        return self.cells[:, self._places(name)[0]]
 
     def numbers(
-        self, name: str, fix: str = "correct the header", remark: str = ""
+        self, name: str, *, complete: bool = False, remark: str = ""
     ) -> NDArray[np.float64]:
         """Numbers of a column, shape (rows,); NaN where one is missing.
 
         Args:
             name: Of the column.
-            fix: What to do if there is none.
+            complete: Whether none may be missing.
             remark: What to say besides if a cell holds something else.
 
         Raises:
             InputError: There is no such column, or a cell holds something else.
         """
         numbers = np.full(len(self.lines), np.nan)
-        for at, cell in enumerate(self.column(name, fix)):
-            if cell.lower() in MISSING:
+        empty = "" if complete else ", or leave it empty where a value is missing"
+        for at, cell in enumerate(self.column(name)):
+            if cell.lower() in MISSING and not complete:
                 continue
             try:
                 numbers[at] = parse_number(cell, self.decimal)
@@ -111,11 +125,15 @@ class Table:
                 raise InputError(
                     str(err),
                     where=self.where(self.lines[at], name),
-                    fix="correct the cell, or leave it empty where a value is missing; this "
-                    f"table has {self.decimal!r} as its decimal sign (a decimal comma needs ';' "
-                    f"between the cells), and thousands are not set apart{remark}",
+                    fix=f"correct the cell{empty}; this table has {self.decimal!r} as its decimal "
+                    "sign (a decimal comma needs ';' between the cells), and thousands are not set "
+                    f"apart{remark}",
                 ) from None
         return numbers
+
+    def rows(self, kept: NDArray[np.bool_]) -> "Table":
+        """Those of its rows, bool (rows,)."""
+        return replace(self, lines=self.lines[kept], cells=self.cells[kept])
 
     def where(self, line: int, name: str) -> str:
         """Place of a cell, for a refusal."""
@@ -154,11 +172,11 @@ def read_table(
     first, header = rows[0] if rows else (1, [])
     while header and not header[-1]:
         header = header[:-1]
-    if header and all(map(is_number, header)):
+    if header and sum(map(is_number, header)) > len(header) / 2:
         raise InputError(
             "holds numbers, not the names of columns",
             where=f"{path}: line {first}",
-            fix=f"write a line of names above the numbers: {','.join(names) or 'a,b,...'}",
+            fix=f"write a line of names above: {delimiter.join(names) or 'a,b,...'}",
         )
     kept = [(line, row) for line, row in rows[1:] if any(row)]
     for line, row in kept:
@@ -188,11 +206,9 @@ def parse_number(text: str, decimal: str = ".") -> float:
         ValueError: The text is something else, or larger than a number may be.
     """
     text = text.strip()
-    if not NUMBERS[decimal].fullmatch(text):
-        raise ValueError(f"{text!r:.40} is no number")
-    number = float(text.replace(decimal, "."))
+    number = float(text.replace(decimal, ".")) if NUMBERS[decimal].fullmatch(text) else math.nan
     if not math.isfinite(number):
-        raise ValueError(f"{text!r:.40} is too large for a number")
+        raise ValueError(f"{text!r:.40} is no finite number")
     return number
 
 
@@ -211,16 +227,12 @@ def _lines(path: Path) -> list[str]:
     marked = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     try:
         text = content.decode("utf-16" if marked else "utf-8-sig")
+        fault = "is no text" if "\0" in text else "" if text.strip() else "is empty"
     except UnicodeDecodeError as err:
-        raise InputError(
-            f"byte {err.start} is no UTF-8 text", where=str(path), fix=SAVE_AS_CSV
-        ) from None
-    if "\0" in text:
-        raise InputError("not a text file", where=str(path), fix=SAVE_AS_CSV)
-    if not text.strip():
-        raise InputError(
-            "is empty", where=str(path), fix="write a header and a line for each measurement"
-        )
+        text, fault = "", f"byte {err.start} is no UTF-8 text"
+    if fault:
+        fix = f"{SAVE_AS_CSV}, with a header and a line for each measurement"
+        raise InputError(fault, where=str(path), fix=fix)
     return text.splitlines(keepends=True)
 
 
@@ -244,11 +256,10 @@ def _sheet(path: Path) -> list[Row]:
 
     try:
         sheet = pandas.read_excel(path, header=None, dtype=str, na_filter=False)
-    except ImportError as err:
+    except (ImportError, OSError, ValueError, LookupError, zipfile.BadZipFile) as err:
+        needs = ", or openpyxl is not installed" if isinstance(err, ImportError) else ""
         fix = f"pip install openpyxl, or {SAVE_AS_CSV}"
-        raise InputError("is a workbook, which needs openpyxl", where=str(path), fix=fix) from err
-    except (OSError, ValueError, LookupError, zipfile.BadZipFile) as err:
-        raise InputError("no workbook that can be read", where=str(path), fix=SAVE_AS_CSV) from err
+        raise InputError(f"no workbook that can be read{needs}", where=str(path), fix=fix) from err
     rows = sheet.to_numpy().tolist()
     return [(line, [cell.strip() for cell in row]) for line, row in enumerate(rows, start=1)]
 
@@ -259,8 +270,9 @@ def _check_row(path: Path, line: int, row: list[str], columns: int) -> None:
         return
     extra = "put quotation marks around a cell that holds the delimiter, or remove what is extra"
     short = "complete the line, with empty cells for what is missing"
+    alone = "; a file holds one table: lines of anything else go into a file of their own"
     raise InputError(
         f"{len(row)} cells, where the header has {columns}",
         where=f"{path}: line {line}",
-        fix=extra if len(row) > columns else short,
+        fix=(extra if len(row) > columns else short) + alone,
     )

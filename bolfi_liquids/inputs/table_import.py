@@ -15,14 +15,13 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 from ..errors import Argument, InputError
 from ..files import new_file, write_netcdf
 from .checks import MAX_GRIPPER_GAP, MIN_SEEN, check_values, clock_difference
-from .fields import AXES, PLANES, STICK_WEIGHT
 from .frame import frame_faults
 from .open import read_recording
-from .recording import Recording, as_recording, recording_dataset
+from .recording import AXES, PLANES, STICK_WEIGHT, Recording, as_recording, recording_dataset
 from .start import check_start
 from .strokes import speed
 from .table import Table, read_table
-from .toml_file import read_toml
+from .toml_file import opened, read_toml
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -32,6 +31,7 @@ logger = logging.getLogger(__name__)
 OTHER_NAME = "choose another name"
 SLOWER = 1.5  # times a step of a log: a longer one is another's, or leaves a row out
 HEADER_FIX = "correct the map: `column`, `skip` or `delimiter`"
+MAP_HINT = "; units, offsets and signs are in the map"
 MAP_FIX = "compare with what `bolfi-liquids import --template` writes"
 ISO = "2026-11-29T13:05:21.250"
 DATES = f'; date and time are read as {ISO} by unit = "iso"'
@@ -80,7 +80,7 @@ class Column[Unit: str](Given):
             return _stamps(table, self.column) + self.offset
         factor = UNITS[self.unit]
         remark = DATES if self.unit in get_args(Seconds) else ""
-        numbers = table.numbers(self.column, fix=HEADER_FIX, remark=remark)
+        numbers = table.numbers(self.column, remark=remark)
         return (-factor if self.flip else factor) * (numbers + self.offset)
 
 
@@ -176,15 +176,18 @@ class TableMap(Given):
     yaw_deg: Annotated[float, Field(ge=-360.0, le=360.0, allow_inf_nan=False)] = 0.0
     source: str = "imported"
 
+    @property
+    def read_columns(self) -> list[tuple[str, Column[Any]]]:
+        """Field and column of all that is read."""
+        return [one for one in self.columns.by_field() if self.rate_hz is None or one[0] != "time"]
+
     def values(self, table: Table) -> dict[str, NDArray[np.float64]]:
         """Variables of a recording by name, in SI units, of shape (rows,)."""
         values: dict[str, NDArray[np.float64]] = {}
-        for name, column in self.columns.by_field():
-            if name != "time" or self.rate_hz is None:
-                read = column.read(table)
-                values[name] = values[name] + read if name in values else read
         if self.rate_hz is not None:
             values["time"] = np.arange(len(table.lines)) / self.rate_hz
+        for name, column in self.read_columns:
+            values[name] = values.get(name, 0.0) + column.read(table)
         return values
 
     def turned(self, values: dict[str, NDArray]) -> dict[str, NDArray]:
@@ -218,25 +221,19 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
             Or `out` is something else that is there already. Nothing was written.
     """
     out = new_file(out, Argument("out"), suffix=".nc")
-    meaning = columns if isinstance(columns, TableMap) else open_table_map(columns)
-    read = read_table(
-        table,
-        [column.column for _, column in meaning.columns.by_field()],
-        delimiter=meaning.delimiter,
-        decimal=meaning.decimal,
-        skip=meaning.skip,
-    )
+    where = Argument("columns")
+    meaning = opened(columns, TableMap, open_table_map, where, "map of columns")
+    columns_read = [column.column for _, column in meaning.read_columns]
+    signs = {"delimiter": meaning.delimiter, "decimal": meaning.decimal, "skip": meaning.skip}
+    read = read_table(table, columns_read, **signs)
+    read.require(columns_read, HEADER_FIX)
     dataset, told = _dataset(read, meaning)
-    try:
-        check_values(as_recording(dataset, read.path, b""))
-    except InputError as err:
-        fix = f"{err.fix}; units, offsets and signs are in the map"
-        raise InputError(err.what, where=err.where, fix=fix) from err
+    check_values(as_recording(dataset, read.path, b""), MAP_HINT)
     _check_target(out)
     write_netcdf(dataset, out)
     if told:
         logger.info("%s: %s", read.path, told)
-    if unused := read.others(column.column for _, column in meaning.columns.by_field()):
+    if unused := read.others(columns_read):
         logger.info("%s: columns not used: %s", read.path, ", ".join(unused))
     return read_recording(out)
 
@@ -259,7 +256,7 @@ def _check_target(out: Path) -> None:
 def _stamps(table: Table, name: str) -> NDArray[np.float64]:
     """Times of a column of ISO 8601 texts since 1970 [s], shape (rows,)."""
     times = np.empty(len(table.lines))
-    for at, cell in enumerate(table.column(name, fix=HEADER_FIX)):
+    for at, cell in enumerate(table.column(name)):
         try:
             time = datetime.fromisoformat(cell)
         except ValueError:

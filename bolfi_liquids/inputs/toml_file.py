@@ -1,7 +1,7 @@
-"""TOML files that a person writes, as models of pydantic."""
+"""Things that a person gives as a value or as the file that holds it, and TOML files."""
 
 import tomllib
-from difflib import get_close_matches
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +9,35 @@ from pydantic import BaseModel, ValidationError
 
 from ..errors import InputError
 from ..files import existing_file
+
+NO_TOML = "correct that line, or save the file as UTF-8 text"
+
+
+def opened[Kind](
+    given: Kind | str | Path,
+    kind: type[Kind],
+    open_file: Callable[[str | Path], Kind],
+    where: str,
+    noun: str,
+) -> Kind:
+    """A value as it is, or what a file holds.
+
+    Args:
+        given: The value, or the path of the file.
+        kind: Of the value.
+        open_file: Reads such a file.
+        where: The argument, for a refusal.
+        noun: What the value is, likewise.
+
+    Raises:
+        InputError: It is something else, or the file cannot be used.
+    """
+    if isinstance(given, kind):
+        return given
+    if isinstance(given, str | Path):
+        return open_file(given)
+    fix = f"give the path of its file, or a value of {kind.__name__}"
+    raise InputError(f"{given!r:.80} is no {noun}", where=where, fix=fix)
 
 
 def read_toml[Model: BaseModel](path: str | Path, model: type[Model], fix: str) -> Model:
@@ -20,31 +49,34 @@ def read_toml[Model: BaseModel](path: str | Path, model: type[Model], fix: str) 
         fix: What a person can do about a field that is wrong.
 
     Raises:
-        InputError: The file is missing or cannot be used; the message names the field.
+        InputError: The file is missing or cannot be used; the message names the fields.
     """
     path = existing_file(path)
     try:
-        return model.model_validate(tomllib.loads(path.read_text(encoding="utf-8-sig")))
+        written = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as err:
-        raise InputError(f"not TOML: {err}", where=str(path), fix="correct that line") from err
+        raise InputError(f"not TOML: {err}", where=str(path), fix=NO_TOML) from err
+    return validated(written, model, str(path), fix)
+
+
+def validated[Model: BaseModel](
+    written: dict[str, Any], model: type[Model], where: str, fix: str
+) -> Model:
+    """A model of values that a person wrote.
+
+    Args:
+        written: The values by name, tables within each other.
+        model: What they must be.
+        where: The file, or the argument.
+        fix: What a person can do about a field that is wrong.
+
+    Raises:
+        InputError: A field is missing, unknown or wrong; all of them are named.
+    """
+    try:
+        return model.model_validate(written)
     except ValidationError as err:
+        from ..hardware.rig_file import field_faults, named_faults
 
-        def where(field: str) -> str:
-            return f"{path}: {field}" if field else str(path)
-
-        likely = _likely(err, model)
-        raise InputError.from_validation(err, where=where, fix=likely or fix) from err
-
-
-def _likely(err: ValidationError, model: type[BaseModel]) -> str:
-    """A question for the field that an unknown one is probably meant to be; "" without one."""
-    unknown = [one["loc"] for one in err.errors() if one["type"] == "extra_forbidden"]
-    if not unknown:
-        return ""
-    *tables, name = map(str, unknown[0])
-    owner: Any = model
-    for table in tables:
-        field = getattr(owner, "model_fields", {}).get(table)
-        owner = field and field.annotation
-    close = get_close_matches(name, getattr(owner, "model_fields", {}), n=1, cutoff=0.5)
-    return f"did you mean {close[0]}?" if close else ""
+        what, place = named_faults(field_faults(err, model), where)
+        raise InputError(what, where=place, fix=fix) from err

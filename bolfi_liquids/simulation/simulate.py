@@ -20,12 +20,19 @@ from ..inputs.described_liquid import (
     VISCOSITY,
     Described,
     check_effects,
-    number_of,
 )
-from ..inputs.fields import LENGTHS, PLANES, STICK_WEIGHT
+from ..inputs.limits import number_of
 from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import check_distance, check_rate
-from ..inputs.recording import Recording, along_path, planned_recording, recording_dataset
+from ..inputs.recording import (
+    LENGTHS,
+    PLANES,
+    STICK_WEIGHT,
+    Recording,
+    along_path,
+    planned_recording,
+    recording_dataset,
+)
 from ..movie.file import PICTURE_RATE, check_movie, write_movie
 from ..pouring.spillage import FRACTIONS
 from ..progress import progress_bar

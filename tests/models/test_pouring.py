@@ -26,10 +26,10 @@ def test_bad_actions_are_named(cups):
         ("hold = 0.9 ", "hold = 'long' ", r"pour\.hold.*long"),
         ("lip_height = 0.20", "lip_height = 0.05", "lip.*not above the receiver's rim"),
         ("[0.0, 0.07]", "[0.07, 0.0]", "distance must ascend"),
-        ("[0.0, 0.07]", "[-50.0, 0.07]", "-50 m looks like millimetres"),
+        ("[0.0, 0.07]", "[-50.0, 0.07]", "0.5 m, got -50"),
         ("radius = 0.028", "radius = inf", r"source\.radius.*inf"),
-        ("radius = 0.028", "radius = 0.56", r"source\.radius.*0.56 m looks like centimetres"),
-        ("radius = 0.028", "radius = 28.0", r"source\.radius.*28 m looks like millimetres"),
+        ("radius = 0.028", "radius = 0.56", r"source\.radius.*0.25 m, got 0.56"),
+        ("radius = 0.028", "radius = 28.0", r"source\.radius.*0.25 m, got 28"),
         ("radius = 0.028", "radius = true", r"source\.radius.*True"),
         ("135.0", "720.0", r"pour\.final_angle_deg.*720"),
         (

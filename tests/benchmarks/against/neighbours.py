@@ -7,7 +7,7 @@ import numpy as np
 from case import Row
 from numpy.typing import NDArray
 
-from bolfi_liquids.inputs.fields import LENGTHS, STICK_WEIGHT
+from bolfi_liquids.inputs.recording import LENGTHS, STICK_WEIGHT
 
 from .stir_replay import CAMERA_NOISE, rms, without_noise
 from .stirs import ReferenceStir

@@ -11,7 +11,7 @@ from bolfi_liquids.models.accuracy import LARGEST_ERRORS
 from case import Curve, Panel, Row
 from numpy.typing import NDArray
 
-from bolfi_liquids.inputs.fields import PLANE_NAMES
+from bolfi_liquids.inputs.recording import PLANE_NAMES
 
 from .stirs import ReferenceStir
 

@@ -36,9 +36,8 @@ from stirring_reference import (
 )
 
 from bolfi_liquids.files import new_file, write_netcdf
-from bolfi_liquids.inputs.fields import AXES, PLANES
 from bolfi_liquids.inputs.open import open_recording
-from bolfi_liquids.inputs.recording import recording_dataset
+from bolfi_liquids.inputs.recording import AXES, PLANES, recording_dataset
 
 if TYPE_CHECKING:
     from xarray import Dataset

@@ -122,33 +122,15 @@ def test_run_directory_and_run_toml_are_told(calibration, pour):
                 assert f"`{key}`" in listed or f"{name}.{key}`" in listed, key
 
 
-def test_rig_toml_is_told_field_by_field_with_both_ends():
-    from bolfi_liquids.hardware import bundled_rig
-    from bolfi_liquids.hardware.rig import Rig
+def test_fields_of_rig_and_cups_are_those_of_their_types():
+    sys.path.append(str(Path(__file__).parent))
+    from field_tables import section, tables
 
-    sys.path.append(str(Path(__file__).parents[2] / "hardware"))
-    from rig_ends import numbers
-
-    in_page = told("rig.toml")
-    assert {name.split(".")[0] for name in in_page} == set(Rig.model_fields)
-    for name, part in bundled_rig():
-        section = part[0] if isinstance(part, tuple) else part
-        for field in type(section).model_fields:
-            assert any(one.startswith(f"{name}.{field}") for one in in_page), (name, field)
-    section = read_page("files").split("# rig.toml\n", 1)[1].split("\n## ")[0]
-    line_of = {
-        name: line
-        for line in section.splitlines()
-        if (match := LINE.match(line))
-        for name in expanded(match["name"])
-    }
-    for place, _, ends in numbers(bundled_rig()):
-        assert ends is not None
-        name = re.sub(r"\.\d+", "", place)
-        unit = in_page[name][1] or ""
-        assert ends.unit in (*unit.split(", "), "times", "vertices"), name
-        if not re.search(r"\.[xyz]$", name):  # whose ends depend on the axis
-            assert f"{ends.low:g} to {ends.high:g}" in line_of[name], name
+    page = read_page("files")
+    for name, table in tables(page).items():
+        assert table in section(page, name), "run tests/bolfi_liquids/guide/field_tables.py"
+        for row in table.splitlines()[2:]:
+            assert row.split(" | ")[2].strip(), row  # its meaning
 
 
 def test_columns_of_a_session_are_told():

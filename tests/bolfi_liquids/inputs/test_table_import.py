@@ -99,14 +99,12 @@ def test_cells_without_a_number_are_missing_samples(tmp_path, written, truth):
     assert "seen in" in outline(found)
 
 
-def merged(truth, *, robot, share=1.0, blind=slice(0, 0)):
-    """Changes a table into a robot's log and a camera's, merged by their times."""
+def merged(truth):
+    """Changes a table into a robot's log at 125 Hz and a camera's, merged by their times."""
 
     def change(rows):
         camera = [row[:1] + ["", "", ""] + row[4:] for row in rows[1:]]
-        for row in camera[blind]:
-            row[4:6] = ["", ""]
-        times = np.arange(truth.time[0], share * truth.time[-1], 1.0 / robot)
+        times = np.arange(truth.time[0], truth.time[-1], 0.008)
         way = [np.interp(times, truth.time, axis) for axis in truth.gripper.position.T]
         columns = (1e3 * times, 1e3 * way[0], -1e3 * way[1], 1e3 * way[2] + OFFSET)
         of_robot = [
@@ -123,12 +121,11 @@ def merged(truth, *, robot, share=1.0, blind=slice(0, 0)):
     return change
 
 
-@pytest.mark.parametrize("robot", [125.0, 500.0])
 def test_a_robot_s_fast_log_is_interpolated_to_the_cameras_and_named(
-    tmp_path, written, truth, caplog, robot
+    tmp_path, written, truth, caplog
 ):
     caplog.set_level("INFO")
-    table = table_of(tmp_path / "merged.csv", truth, merged(truth, robot=robot))
+    table = table_of(tmp_path / "merged.csv", truth, merged(truth))
     found = import_table(table, written[1], tmp_path / "merged.nc")
     count = len(found.time)  # the robot's log ends a little before the cameras'
     assert len(truth.time) - 2 <= count <= len(truth.time)
@@ -170,124 +167,58 @@ def test_the_robot_s_own_gap_is_not_filled():
     np.testing.assert_allclose(made["x"][outside][:-1], made["time"][outside][:-1])
 
 
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        (lambda rows: rows[7].__setitem__(1, "1.5.2"), r"line 10, column X: '1.5.2' is no number"),
-        (lambda rows: rows[0].__setitem__(4, "Angle"), "no column 'A' among"),
-        (lambda rows: rows[0].__setitem__(6, "X"), "2 columns are named 'X'"),
-        (lambda rows: rows.insert(20, rows[21]), "repeated stamps = 1"),
-        (lambda rows: rows.clear(), "no column"),
-        (
-            lambda rows: rows[7].__delitem__(slice(3, None)),
-            "line 10: 3 cells, where the header has 7",
-        ),
-        (lambda rows: rows.__delitem__(slice(5, None)), "number of samples = 4"),
-    ],
-)
-def test_what_cannot_be_used_is_named(tmp_path, written, truth, change, says):
-    table = table_of(tmp_path / "bad.csv", truth, change)
-    with pytest.raises(ValueError, match=says):
-        import_table(table, written[1], tmp_path / "bad.nc")
-    assert not (tmp_path / "bad.nc").exists()
+MAP_SLIPS = {
+    "another unit": ('unit = "deg"', 'unit = "rad"', ("inclination_xz", "7.79", "in the map")),
+    "no offset": ('"mm", offset = -120.0', '"mm"', ("z, ", "above the")),
+    "unknown unit": ('unit = "ms"', 'unit = "hours"', ("columns.time.0.unit", "'ms'", "'hours'")),
+    "unknown column": ("time = {", "tine = {", ("columns.tine", "did you mean time")),
+    "no column": ('inclination_yz = { column = "B"', "#", ("'inclination_yz'",)),
+    "a turn": ("skip = 2", "skip = 2\nyaw_deg = 4500", ("yaw_deg",)),
+    "one column twice": ('"X", unit = "mm"', '"Y", unit = "mm"', ("columns: y and x",)),
+    "no unit": ('"X", unit = "mm"', '"X"', ("columns.x.unit",)),
+    "two weights": (
+        "[attributes]",
+        '[attributes]\nstick_mass = { value = 9.0, unit = "g" }',
+        ("both are given",),
+    ),
+}
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "says"),
-    [
-        ('unit = "deg"', 'unit = "rad"', "inclination_xz: .*7.79.* rad.*in the map"),
-        ('"Z", unit = "mm", offset = -120.0', '"Z", unit = "mm"', "z, .*above the"),
-        ('unit = "ms"', 'unit = "hours"', "columns.time.0.unit: .*'s', 'ms'.*'hours'"),
-        ("time = {", "tine = {", "columns.tine: .*did you mean time"),
-        (
-            'inclination_yz = { column = "B", unit = "mrad", flip = true }',
-            "",
-            "no column 'inclination_yz'",
-        ),
-        ("skip = 2", 'skip = "2"', "skip"),
-        ("skip = 2", "skip 2", "not TOML"),
-        (
-            "liquid_density = { value",
-            "liquid_densty = { value",
-            "liquid_densty: .*did you mean liquid_density",
-        ),
-        ('"X", unit = "mm"', '"Y", unit = "mm"', "columns: y and x are both 'Y'"),
-        ('"X", unit = "mm"', '"X", units = "mm"', "columns.x.units: is no field that is known"),
-        ('"X", unit = "mm"', '"X"', "columns.x.unit: is missing"),
-        (
-            "[attributes]",
-            '[attributes]\nstick_mass = { value = 9.0, unit = "g" }',
-            "both are given",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "says"), MAP_SLIPS.values(), ids=MAP_SLIPS)
 def test_a_map_that_cannot_be_right_is_named(tmp_path, written, old, new, says):
     table, columns = written
     text = columns.read_text()
     assert old in text
     columns.write_text(text.replace(old, new))
-    with pytest.raises(ValueError, match=says):
+    with pytest.raises(ValueError) as refused:
         import_table(table, columns, tmp_path / "stir.nc")
+    assert all(part in str(refused.value) for part in says), refused.value
     assert not (tmp_path / "stir.nc").exists()
 
 
-@pytest.mark.parametrize("liquid", RECORDED_LIQUIDS)
-def test_what_a_stick_does_is_not_warned_of(liquid):
-    assert "warning" not in outline(bundled_recording(liquid))
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "says"),
-    [
-        ('"B", unit = "mrad", flip = true', '"B", unit = "mrad"', "_yz, or of y, is wrong"),
-        ('"X", unit = "mm" }', '"X", unit = "mm", flip = true }', "_xz, or of x, is wrong"),
-        ("inclination_xz = {", "swap", "exchanged"),
-    ],
-)
-def test_a_stick_that_cannot_lean_so_is_warned_of(tmp_path, written, old, new, says):
-    table, columns = written
-    text = columns.read_text()
-    if new == "swap":
-        rest = text.replace("inclination_xz =", "X =").replace(
-            "inclination_yz =", "inclination_xz ="
-        )
-        columns.write_text(rest.replace("X =", "inclination_yz ="))
-    else:
-        columns.write_text(text.replace(old, new))
-    told = outline(import_table(table, columns, tmp_path / "stir.nc"))
-    assert re.search(f"warning: .*{says}", told)
-
-
-def test_sizes_are_told_as_a_person_measures_them(truth):
-    assert "cup: radius 4 cm" in outline(truth) and "liquid: 1000 kg/m" in outline(truth)
-
-
-@pytest.mark.parametrize("name", ["stir.csv", "columns.toml", "other.nc"])
+@pytest.mark.parametrize("name", ["stir.csv", "other.nc"])
 def test_nothing_but_an_import_is_written_over(tmp_path, written, name):
     (tmp_path / "other.nc").write_text("mine")
     before = (tmp_path / name).read_bytes()
-    with pytest.raises(ValueError, match="ends in|exists already, and is no import"):
+    with pytest.raises(ValueError, match=name):
         import_table(*written, tmp_path / name)
     assert (tmp_path / name).read_bytes() == before
 
 
-def test_columns_that_the_map_leaves_out_are_told(tmp_path, written, caplog):
+def test_an_import_may_be_made_again_and_tells_what_it_leaves_out(tmp_path, written, caplog):
     caplog.set_level("INFO")
-    import_table(*written, tmp_path / "stir.nc")
-    (told,) = caplog.records
-    assert "stir.csv: columns not used: note" in told.getMessage()
+    again = [import_table(*written, tmp_path / "stir.nc").hash for _ in range(2)]
+    assert len(set(again)) == 1
+    assert "stir.csv: columns not used: note" in caplog.records[0].getMessage()
 
 
-def test_a_stir_from_the_middle_is_imported_and_warned_of(tmp_path, written, truth):
+def test_what_was_read_is_outlined_and_a_stir_from_the_middle_warned_of(tmp_path, written, truth):
+    assert "cup: radius 4 cm" in outline(truth) and "liquid: 1000 kg/m" in outline(truth)
+    assert not any("warning" in outline(bundled_recording(liquid)) for liquid in RECORDED_LIQUIDS)
     table = table_of(tmp_path / "late.csv", truth, lambda rows: rows.__delitem__(slice(1, 60)))
     found = import_table(table, written[1], tmp_path / "late.nc")
     (warned,) = [line for line in outline(found).splitlines() if line.startswith("warning")]
     assert "late.nc" in warned and "starts in motion" in warned
-
-
-def test_an_import_may_be_made_again(tmp_path, written):
-    again = [import_table(*written, tmp_path / "stir.nc").hash for _ in range(2)]
-    assert len(set(again)) == 1
 
 
 def test_the_template_is_a_map_and_overwrites_nothing(tmp_path):
@@ -306,23 +237,13 @@ def test_a_turned_cup_frame_is_warned_of_and_yaw_turns_it_back(tmp_path, written
             row[1:3] = [f"{value:.9g}".replace(".", ",") for value in (way.real, -way.imag)]
 
     table, columns = table_of(tmp_path / "turned.csv", truth, turn), written[1]
-    found = import_table(table, columns, tmp_path / "turned.nc")
-    (warning,) = [line for line in outline(found).splitlines() if line.startswith("warning")]
-    (yaw,) = re.findall(r"add (-?\d+) to `yaw_deg`", warning)
-    assert int(yaw) == pytest.approx(30, abs=6)  # water turns the stick by some degrees itself
     text = columns.read_text()
-    columns.write_text("yaw_deg = -90\n" + text)  # the advice counts from what the map says
-    (warning,) = recording_warnings([import_table(table, columns, tmp_path / "worse.nc")])
-    (more,) = re.findall(r"add (-?\d+) to `yaw_deg`", warning)
-    assert int(more) - 90 == pytest.approx(30, abs=6)
+    for yaw in (0, -90):  # the advice counts from what the map says
+        columns.write_text(f"yaw_deg = {yaw}\n" + text)
+        (warning,) = recording_warnings([import_table(table, columns, tmp_path / "turned.nc")])
+        (more,) = re.findall(r"add (-?\d+) to `yaw_deg`", warning)
+        assert int(more) + yaw == pytest.approx(30, abs=6)  # water turns the stick by some degrees
     columns.write_text("yaw_deg = 30\n" + text)
     mended = import_table(table, columns, tmp_path / "mended.nc")
     np.testing.assert_allclose(mended.gripper.position, truth.gripper.position, atol=1e-8)
     assert "warning" not in outline(mended)
-
-
-def test_a_yaw_that_is_no_angle_is_refused(tmp_path, written):
-    table, columns = written
-    columns.write_text("yaw_deg = 4500\n" + columns.read_text())
-    with pytest.raises(ValueError, match="yaw_deg"):
-        import_table(table, columns, tmp_path / "stir.nc")
