@@ -27,7 +27,7 @@ from ..run.given_pours import keep_pours
 from ..run.run import Run, RunOrPath
 from ..simulators import StirSimulator, stir_simulator
 from .criticism_file import criticism_tree
-from .inputs import Inputs, open_inputs
+from .inputs import Inputs, check_effects, open_inputs
 from .pours import as_prior, pour_experiment, pour_proposals
 from .result import Criticism
 from .summary import CriticismSummary
@@ -89,6 +89,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     # their rules make them tuples
     named: dict[str, Any] = {"effects": effects, "accept": accept}
     settings = CriticismSettings(**named, seed=seed, batch=batch)
+    check_effects(settings)
     kept_back = open_recordings(held_out, Argument("held_out"))
     clean = open_recordings(baseline, Argument("baseline"))
     with Run.entered(calibration) as run:

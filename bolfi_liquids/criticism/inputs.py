@@ -121,7 +121,7 @@ def open_inputs(
     check_beside(stirring, list(clean.values()), "baseline")
     table, cups = table_and_cups(poured[0], cups)
     held_out_table = table_of(poured[1], Argument("held_out_pours"))
-    for where, what, fix in _faults(settings, table, held_out_table):
+    for where, what, fix in _pours_faults(settings, table, held_out_table):
         raise InputError(what, where=Argument(where), fix=fix)
     if held_out_table is not None:
         check_scene(held_out_table, cups)
@@ -138,14 +138,17 @@ def open_inputs(
     )
 
 
-def _faults(
-    settings: CriticismSettings, table: PourTable | None, held_out: PourTable | None
-) -> Iterator[tuple[str, str, str]]:
-    """Arguments that cannot be used, why, and what to do about each."""
+def check_effects(settings: CriticismSettings) -> None:
+    """Raise InputError unless the effects exist, and one acts in a stir."""
+    for where, what, fix in _effects_faults(settings):
+        raise InputError(what, where=Argument(where), fix=fix)
+
+
+def _effects_faults(settings: CriticismSettings) -> Iterator[tuple[str, str, str]]:
+    """Options that cannot be used, why, and what to do about each."""
     from ..models import EFFECTS
 
-    stir, pour = names_of_effects("stir"), names_of_effects("pour")
-    considered = settings.effects or tuple(EFFECTS)
+    stir, considered = names_of_effects("stir"), settings.effects or tuple(EFFECTS)
     for name in considered:
         if name not in EFFECTS:
             yield "effects", f"there is no effect {name}", f"choose from {', '.join(EFFECTS)}"
@@ -155,7 +158,14 @@ def _faults(
         if name not in considered:
             what = f"{name!r} is none of the effects that are considered"
             yield "accept", what, f"choose from {', '.join(considered)}"
-    if table is not None and not set(considered) & set(pour):
+
+
+def _pours_faults(
+    settings: CriticismSettings, table: PourTable | None, held_out: PourTable | None
+) -> Iterator[tuple[str, str, str]]:
+    """Arguments about pours that cannot be used, why, and what to do about each."""
+    pour = names_of_effects("pour")
+    if table is not None and not set(settings.effects or pour) & set(pour):
         fix = f"choose from {', '.join(pour)}, or give no `pours`"
         yield "effects", "none of the effects acts in a pour", fix
     if held_out is not None:

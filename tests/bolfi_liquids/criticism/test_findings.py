@@ -157,15 +157,19 @@ def hypothesis(difference):
 
 def test_gaps_and_residuals_are_observed_less_expected():
     before, after = hypothesis([5.0, -5.0, 5.0, -5.0]), hypothesis([3.0, -3.0, 3.0, -3.0])
-    gap = Gap("third", before=10.0, after=6.0, noise=3.0, usual=4.0, floor=0, p_value=1, lpd_gain=0)
+    gap = Gap(
+        "third", before=10.0, after=6.0, noise=3.0, model_error=4.0, floor=0, p_value=1, lpd_gain=0
+    )
     found = SimpleNamespace(
         leading=SimpleNamespace(hypothesis=after, names=after.names),
         base=SimpleNamespace(hypothesis=before),
         extended=after,
         gaps={after.names: (gap, gap)},
-        measurement=6.0 * np.eye(4),
-        usual=4.0,
-        observed=np.zeros((2, 2)),
+        experiment=SimpleNamespace(
+            measurement=SimpleNamespace(covariance=lambda layout: 6.0 * np.eye(4)),
+            model_error_rms=4.0,
+            observed=np.zeros((2, 2)),
+        ),
     )
     summary = {name: np.radians(of) for name, of in vars(GapSummary.of(found)).items()}
     expected = {"noise": 3.0, "usual": 4.0, "rms_before": 5.0, "rms_after": 3.0}
