@@ -115,10 +115,7 @@ def test_one_recording_that_was_opened_is_not_held_out_twice(calibration, given)
         ({"pours": "pours", "held_out_pours": "pours"}, "held_out_pours"),
         ({"pours": "pours", "held_out_pours": "far"}, "far.csv"),
         ({"pours": "pours", "cups": 3}, "cups"),
-        ({"settings": {"effects": "magic"}}, "effects"),
-        ({"settings": {"effects": "adhesion"}}, "effects"),
         ({"settings": {"effects": "camera_delay"}, "pours": "pours"}, "effects"),
-        ({"settings": {"effects": "camera_delay", "accept": "camera_tilt"}}, "accept"),
     ],
 )
 def test_what_cannot_be_used_is_refused_by_its_name(given, names, where):
@@ -127,6 +124,20 @@ def test_what_cannot_be_used_is_refused_by_its_name(given, names, where):
         options["settings"] = CriticismSettings(**names["settings"])
     with pytest.raises(InputError) as refused:
         given(**options)
+    assert where in refused.value.where
+
+
+@pytest.mark.parametrize(
+    ("options", "where"),
+    [
+        ({"effects": "magic"}, "effects"),
+        ({"effects": "adhesion"}, "effects"),
+        ({"effects": "camera_delay", "accept": "camera_tilt"}, "accept"),
+    ],
+)
+def test_effects_are_refused_before_the_run_is_looked_at(tmp_path, options, where):
+    with pytest.raises(InputError) as refused:
+        bl.criticise(tmp_path, **options)
     assert where in refused.value.where
 
 
