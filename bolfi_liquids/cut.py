@@ -10,7 +10,7 @@ import numpy as np
 from .errors import Argument, InputError
 from .files import existing_file, new_file, write_netcdf
 from .inputs.checks import check_times
-from .inputs.limits import number_of
+from .inputs.limits import checked_number
 from .inputs.open import check_recording, open_recording, read_fields
 from .inputs.recording import Recording, as_recording
 from .inputs.start import first_rest
@@ -79,9 +79,9 @@ def proposed_cut(
     """
     where, time = str(recording.path), recording.time
     check_times(recording)
-    stop = _last_seen(recording) if stop is None else number_of(stop, Argument("stop"))
+    stop = _last_seen(recording) if stop is None else checked_number(stop, Argument("stop"))
     if start is not None:
-        start = number_of(start, Argument("start"))
+        start = checked_number(start, Argument("start"))
     elif (start := first_rest(recording)) is None:
         raise InputError(
             "there is no time at which gripper and stick rest in the liquid before a stir",

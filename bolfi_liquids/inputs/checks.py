@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .limits import ABOVE_0, BELOW_1, INF, Limits, number_of
+from .limits import ABOVE_0, BELOW_1, INF, Limits, checked_number
 from .recording import AXES, JUMPS, PLANES, STICK_WEIGHT, Recording, steps, torn_values
 from .start import above_liquid, noise_of
 
@@ -100,7 +100,7 @@ def check_times(recording: Recording) -> None:
 
 def _size(recording: Recording, field: str) -> Measured:
     """An attribute, which must be a number."""
-    return number_of(recording.attrs.get(field), f"{recording.path}: attribute {field}")
+    return checked_number(recording.attrs.get(field), f"{recording.path}: attribute {field}")
 
 
 def longest_gap(time: NDArray, seen: NDArray[np.bool_]) -> tuple[float, float]:

@@ -51,7 +51,7 @@ class Limits(NamedTuple):
         return f"{self.least:g}" if self.least == self.most else f"{self.least:g} to {self.most:g}"
 
 
-def number_of(value: Any, where: str) -> float:
+def checked_number(value: Any, where: str) -> float:
     """A value that must be one number.
 
     Raises:

@@ -125,15 +125,15 @@ def _delay(plan: Recording, time: NDArray, position: NDArray, before: float) -> 
     """The one with which the arm is nearest to its plan [s]."""
     from scipy.optimize import minimize_scalar
 
-    def squared(delay: float) -> float:
+    def squared_error(delay: float) -> float:
         return float(np.mean(_distance(plan, time - delay, position) ** 2))
 
     # of a stroke that has just begun, there may be several minima
     tried = before + np.arange(-SEARCHED, SEARCHED + STEP, STEP)
-    near = float(tried[np.argmin([squared(delay) for delay in tried])])
-    found: Any = minimize_scalar(squared, bounds=(near - STEP, near + STEP), method="bounded")
+    near = float(tried[np.argmin([squared_error(delay) for delay in tried])])
+    found: Any = minimize_scalar(squared_error, bounds=(near - STEP, near + STEP), method="bounded")
     # as recorded, where that is as near as can be
-    return before if squared(before) <= squared(found.x) else float(found.x)
+    return before if squared_error(before) <= squared_error(found.x) else float(found.x)
 
 
 def _sampled(wanted: NDArray, time: NDArray, values: NDArray) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ from ..inputs.described_liquid import (
     Described,
     check_effects,
 )
-from ..inputs.limits import number_of
+from ..inputs.limits import checked_number
 from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import check_distance, check_rate
 from ..inputs.recording import (
@@ -103,7 +103,7 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     """
     from ..models import StirSetup
 
-    weighed = None if density is None else number_of(density, Argument("density"))
+    weighed = None if density is None else checked_number(density, Argument("density"))
     liquids = described_liquids(
         {"viscosity": viscosity, "cohesion": cohesion, "seed": seed},
         density=DENSITY if weighed is None else weighed,
@@ -212,12 +212,12 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     """
     cups = cups_of(cups)
     distance_at, rate_at = Argument("distance"), Argument("angular_velocity")
-    distance, rate = number_of(distance, distance_at), number_of(angular_velocity, rate_at)
+    distance, rate = checked_number(distance, distance_at), checked_number(angular_velocity, rate_at)
     check_distance(distance, cups, distance_at)
     check_rate(rate, cups, rate_at)
     liquids = described_liquids(
         {"viscosity": viscosity, "cohesion": cohesion, "seed": seed},
-        density=number_of(density, Argument("density")),
+        density=checked_number(density, Argument("density")),
         effects=check_effects(effects, "pour"),
         particles=particles,
     )
@@ -389,7 +389,7 @@ def _with_rig(
         raise InputError(f"{rig!r:.80}", where=Argument("rig"), fix="give sizes by name")
     weights = [name for name in STICK_WEIGHT if name in sizes]
     for name, value in sizes.items():
-        positive = name in RIG_SIZES and number_of(value, f"rig: {name}") > 0.0
+        positive = name in RIG_SIZES and checked_number(value, f"rig: {name}") > 0.0
         if not positive or weights[1:] == [name]:
             fix = f"give positive {', '.join(LENGTHS)}, and {' or '.join(STICK_WEIGHT)}"
             raise InputError(f"{value!r}", where=f"rig: {name}", fix=fix)

@@ -225,16 +225,16 @@ def matched(
         weights = q ** (dimension / 2) * ndtr(z - (raised - mean) / sigma)  # of log q
         return float(np.log(weights @ q / weights.sum() / (dimension * variance / unit)))
 
-    def root(function: Callable[[float], float], low: float, high: float) -> float:
+    def root_of(function: Callable[[float], float], low: float, high: float) -> float:
         return float(brentq(function, low, high))  # pyright: ignore[reportArgumentType]
 
     usual, lowest = float(ndtri(MATCHED_QUANTILE)), float(ndtri(LEAST_QUANTILE))
     if excess(usual, sd) < 0.0:
         top = float(raised[-1] - mean)
         wide = excess(usual, top) < 0.0
-        sigma = top if wide else root(lambda sigma: excess(usual, sigma), sd, top)
+        sigma = top if wide else root_of(lambda sigma: excess(usual, sigma), sd, top)
         return mean + usual * sigma, float(np.sqrt(max(sigma**2 - sd**2, 0.0)))
-    z = lowest if excess(lowest, sd) > 0.0 else root(lambda z: excess(z, sd), lowest, usual)
+    z = lowest if excess(lowest, sd) > 0.0 else root_of(lambda z: excess(z, sd), lowest, usual)
     return mean + z * sd, 0.0
 
 

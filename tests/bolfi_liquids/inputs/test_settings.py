@@ -10,7 +10,7 @@ from xarray import DataArray
 
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.described_liquid import check_effects
-from bolfi_liquids.inputs.limits import number_of
+from bolfi_liquids.inputs.limits import checked_number
 from bolfi_liquids.inputs.settings import (
     MAX_SIMULATIONS,
     MIN_SIMULATIONS,
@@ -75,14 +75,14 @@ def test_settings_are_plain_values():
 
 @pytest.mark.parametrize("number", [np.float32(0.1), DataArray(0.1)])
 def test_a_number_may_be_an_array_without_axes(number):
-    assert number_of(number, "a") == check_effects({"adhesion": number}, "pour")["adhesion"]
-    assert type(number_of(number, "a")) is float
+    assert checked_number(number, "a") == check_effects({"adhesion": number}, "pour")["adhesion"]
+    assert type(checked_number(number, "a")) is float
 
 
 @pytest.mark.parametrize("other", [True, "0.1", np.array([0.1]), np.nan])
 def test_what_is_no_number_is_refused(other):
     with pytest.raises(InputError, match="^a: .*give one finite number"):
-        number_of(other, "a")
+        checked_number(other, "a")
     with pytest.raises(InputError, match="^--effect adhesion=.*give adhesion=NUMBER"):
         check_effects({"adhesion": other}, "pour")
 
