@@ -212,7 +212,8 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     """
     cups = cups_of(cups)
     distance_at, rate_at = Argument("distance"), Argument("angular_velocity")
-    distance, rate = checked_number(distance, distance_at), checked_number(angular_velocity, rate_at)
+    distance = checked_number(distance, distance_at)
+    rate = checked_number(angular_velocity, rate_at)
     check_distance(distance, cups, distance_at)
     check_rate(rate, cups, rate_at)
     liquids = described_liquids(
