@@ -92,7 +92,7 @@ def noise_of(fit: Fit) -> Noise | None:
 
 def _estimated(fit: Fit) -> Noise | None:
     found = fit.learned
-    if not isinstance(found, SignalSurrogate) or not isinstance(found.scale, Plain):
+    if not isinstance(found, SignalSurrogate) or type(found.scale) is not Plain:
         return None
     output = found.output
     one_channel = output.series and not output.layout.channel.any()

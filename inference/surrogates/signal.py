@@ -33,6 +33,7 @@ from .measurement_noise import (
 )
 from .noise.by_mean import ByMean, OutputScale, Plain, SdOfMean, law_of
 from .noise.given import Covariance, GivenNoise, check_noise, given_noise
+from .noise.stretched import stretched
 from .output_vectors import Output, Summary, describe, infinities, summarise
 from .processes import OfProcesses, learn_success
 from .signal_likelihood import SignalLikelihood, likelihood_of, node_log_densities
@@ -374,7 +375,7 @@ class SignalFamily(Family):
             None estimates it: as an AR(1) process where the output is a series, of at least 5
             samples without a summary.
         varying_noise: Whether the noise that the simulator makes itself may depend on the
-            parameters, where runs show that it does.
+            parameters and on the mean, where runs show that it does.
         misfit: Prior probability that the data are missed by more than the given noise, because
             the simulator errs or the noise is larger; its size is integrated out. 0 for never.
         components: At most.
@@ -460,9 +461,13 @@ class SignalFamily(Family):
         self, data: TrainingData, key: np.ndarray, previous: SignalSurrogate | None
     ) -> SignalSurrogate:
         _, output, scale = data.observed
-        features, units = scale.of(data.features), scale.unit(output)
-        if previous is not None and not previous.emulator.goes_on(features):
+        if previous is not None and previous.emulator.goes_on(previous.scale.of(data.features)):
+            scale = previous.scale
+        else:
             previous = None
+            if self.varying_noise and isinstance(scale, Plain):
+                scale = stretched(scale, data.u, data.features, output.layout.channel)
+        features, units = scale.of(data.features), scale.unit(output)
         limits = EmulatorLimits(self.components, self.predicted, scale.left)
         old = None if previous is None else previous.emulator
         emulator = emulate(data.u, features, units, limits, old, data.normal)

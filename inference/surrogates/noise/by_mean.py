@@ -1,4 +1,4 @@
-"""Noise whose size follows from the simulated mean, and scales on which noise is even."""
+"""Noise whose size follows from the simulated mean, and the scale on which it is even."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -251,4 +251,4 @@ class ByMean:
 
 
 OutputScale = Plain | ByMean
-"""Scales on which outputs are emulated: there, noise is the same everywhere."""
+"""Scales on which outputs are emulated."""

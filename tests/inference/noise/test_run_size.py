@@ -62,7 +62,7 @@ def test_a_constant_spread_changes_no_bit():
     np.testing.assert_array_equal(*found)
 
 
-def test_counts_of_a_random_simulator():
+def test_counts_of_a_random_simulator_are_emulated_as_roots():
     shape = np.linspace(1.0, 8.0, 20)
 
     def simulate(theta, seeds):
@@ -71,6 +71,7 @@ def test_counts_of_a_random_simulator():
 
     observed = np.random.default_rng(3).poisson(4.0 * shape) * 1.0
     fit, draws = drawn(simulate, observed)
+    assert fit.learned.scale.stretch.power == 1
     log_density = observed.sum() * np.log(GRID) - GRID * shape.sum()
     weight = np.exp(log_density - log_density.max())
     weight /= weight.sum()
