@@ -72,7 +72,7 @@ def trim(
 def proposed_cut(
     recording: Recording, start: float | None = None, stop: float | None = None
 ) -> Cut:
-    """What `trim` keeps; times that are given stay as they are.
+    """Cut that `trim` proposes; times that are given stay as they are.
 
     Raises:
         InputError: The recording has no such times.

@@ -34,7 +34,7 @@ POURS = 24  # that each decision's map is learned from: few, as two are made
 
 
 class Demo(NamedTuple):
-    """What the demo leaves.
+    """Results of the demo.
 
     Attributes:
         calibration, criticism, pour: As the run holds them.

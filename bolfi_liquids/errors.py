@@ -37,7 +37,7 @@ class InputError(ValueError):
         self.fix = fix
 
     def as_typed(self, options: Mapping[str, str]) -> str:
-        """The same in one line for a person who has typed a command.
+        """Error in one line, with options as they are typed.
 
         Args:
             options: Of the command, by the names of Python's arguments, which `fix` has in

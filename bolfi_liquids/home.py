@@ -7,7 +7,7 @@ import tempfile
 
 
 def ensure_home() -> None:
-    """See that libraries find a directory to write to, in this process and those that it starts.
+    """Give libraries a directory to write to, in this process and those that it starts.
 
     In a container a user may have no home, nor an entry in passwd. Matplotlib and ArviZ then fail
     when they are imported, and Taichi aborts the process: HOME is set. A home that cannot be

@@ -6,7 +6,7 @@ import numpy as np
 
 
 class Phase(Enum):
-    """What random numbers are for; its text is part of their seed and must not change."""
+    """Purpose of random numbers; its text is part of their seed and must not change."""
 
     BOOTSTRAP = "bootstrap"
     DRAINING = "pours whose source is held for long"

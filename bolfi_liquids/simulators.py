@@ -95,7 +95,7 @@ class StirSimulator(FluidSimulator):
         return np.concatenate(signals, axis=1)
 
     def frames(self, theta: Mapping[str, float], seed: int, rate: float) -> "StirFrames":
-        """What one stir looks like, `rate` times a second; of one recording alone."""
+        """Frames of one stir, `rate` times a second; of one recording alone."""
         from . import models
 
         (recording,), (setup,) = self.recordings, self.setups
@@ -148,7 +148,7 @@ class StirSimulator(FluidSimulator):
 
     @property
     def identity(self) -> str:
-        """Of settings, density and gripper paths."""
+        """Text that settings, density and gripper paths decide."""
         paths = hashlib.sha256()
         for recording in self.recordings:
             paths.update(recording.gripper.time.tobytes())
@@ -199,7 +199,7 @@ class PourOutcome(Protocol):
 
     @property
     def settings(self) -> list[Any]:
-        """What fixes it, as JSON; its name comes first."""
+        """Settings of an outcome as JSON, its name first."""
         ...
 
 
@@ -234,14 +234,14 @@ class PourSimulator(FluidSimulator):
         return models.PourBatch(named, theta[RATE], self.cups, seeds, self.particles, effects)
 
     def frames(self, theta: Mapping[str, float], seed: int, rate: float) -> "PourFrames":
-        """What one pour looks like, `rate` times a second, whatever is kept of it."""
+        """Frames of one pour, `rate` times a second, whatever is kept of it."""
         from . import models
 
         return models.pour_frames(self.batch(theta, [seed]), rate=rate)
 
     @property
     def identity(self) -> str:
-        """Of outcome, cups, density and effects."""
+        """Text that outcome, cups, density and effects decide."""
         name, *fixed = self.outcome.settings
         made_of = [self.cups.settings(self.particles), self.density, list(self.effects), *fixed]
         return json.dumps([name, *made_of], sort_keys=True)

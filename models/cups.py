@@ -107,7 +107,7 @@ class Receiver(_Section, frozen=True):
 
 
 class PourPlan(_Section, frozen=True):
-    """How the source turns, and the range of the decision, in the units that people type.
+    """Turn of the source, and range of the decision, in the units that people type.
 
     Attributes:
         lip_height: Of the source's lip above the receiver's floor [m]; the source turns about it.

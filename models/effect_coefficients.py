@@ -145,7 +145,7 @@ def changed_rig(rig: Rig, acting: tuple[Acting, ...]) -> Rig:
 
 
 def changed_signal(time: np.ndarray, angles: np.ndarray, acting: tuple[Acting, ...]) -> np.ndarray:
-    """What the cameras make of the angles.
+    """Angles as the cameras see them, after every effect in the sensor.
 
     Args:
         time: Sample times [s], shape [T].

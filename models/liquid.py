@@ -29,7 +29,7 @@ class Liquid:
     adhesion: ArrayLike = 0.0
 
     def batch(self, size: int) -> "Liquid":
-        """The same liquids with every field of shape (size,) and dtype float32.
+        """Liquids with every field of shape (size,) and dtype float32.
 
         Raises:
             ValueError: a field is not finite, is negative (density: not positive; adhesion may be)

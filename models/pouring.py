@@ -150,7 +150,7 @@ class PourBatch(NamedTuple):
 
 
 def watched_landings(batch: PourBatch, watch: Watch | None = None) -> Landings:
-    """What `landings` returns, while `watch` looks at each of its scenes."""
+    """Landings of a batch, while `watch` looks at each of its scenes."""
     found, cups = _flights(batch, watch), batch.cups
     drop = cups.pour.lip_height - cups.receiver.height
     position = np.stack([landing_of(flights, drop) for flights in found])

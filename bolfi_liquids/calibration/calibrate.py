@@ -228,7 +228,7 @@ def _calibrate(
 
 
 def _usual_prior(path: Path, resume: bool) -> "Prior":
-    """That of a run that goes on, or else the default."""
+    """Prior of a run that goes on, or else the default."""
     begun = resume and (path / RUN_TOML).exists()
     settings = Run.open(path).record.get("settings", {}) if begun else {}
     return read_prior(settings["prior"]) if "prior" in settings else default_prior()

@@ -121,7 +121,7 @@ def check_beside(stirring: StirSimulator, recordings: Sequence[Recording], optio
 def _faults(
     stirring: StirSimulator, recording: Recording, before: Sequence[Recording], option: str
 ) -> Iterator[tuple[str, str]]:
-    """What is wrong with a recording, and what to do about it; see `check_beside`.
+    """Yield each fault of a recording and its cure; see `check_beside`.
 
     Args:
         stirring, option: As there.
@@ -196,7 +196,7 @@ def usual_for(
 def regime_distance(
     known: Sequence[float | None], viscosity: float | None, least: float
 ) -> NDArray[np.float64]:
-    """How far liquids are from another one, as simulator errors go, shape (n,).
+    """Distance of liquids from another one in units of the errors' correlation, shape (n,).
 
     The simulator errs by half a degree in water and by less than 0.05 degrees in glycerin.
 

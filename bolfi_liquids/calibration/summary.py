@@ -52,7 +52,7 @@ class SamplerStatus(StrEnum):
 
     @property
     def advice(self) -> str:
-        """What to do."""
+        """Cure."""
         return {
             SamplerStatus.CONVERGED: "the intervals of the posterior may be used",
             SamplerStatus.NOT_CONVERGED: "calibrate again with more draws",
@@ -217,7 +217,7 @@ class CalibrationSummary(Section):
 
     @property
     def unexplained_deg(self) -> float:
-        """What the simulator's own error leaves of `fit_rms_deg`."""
+        """`fit_rms_deg` less the simulator's own error, in quadrature."""
         return unexplained(self.fit_rms_deg, self.simulator_error_deg)
 
     @computed_field
@@ -250,7 +250,7 @@ class CalibrationSummary(Section):
 
 
 def bad_fit(summary: CalibrationSummary) -> str | None:
-    """What is likely wrong with a fit; None where it is as close as can be asked for.
+    """Likely fault of a fit; None where it is as close as can be asked for.
 
     Args:
         summary: Of the calibration that counts, with what a criticism accepted.
@@ -277,7 +277,7 @@ def refuse_bad_fit(summary: CalibrationSummary, run: Path) -> None:
 
 
 def unexplained(misfit: float, error: float) -> float:
-    """What an error that is independent of the rest leaves of an RMS difference; 0 where all."""
+    """RMS difference less an independent error, in quadrature; 0 where the error is larger."""
     return float(np.sqrt(np.maximum(misfit**2 - error**2, 0.0)))
 
 

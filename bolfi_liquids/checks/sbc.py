@@ -117,7 +117,7 @@ def _record(settings: SbcSettings, prior: "Prior", stirring: StirSimulator) -> M
 
 @dataclass(frozen=True)
 class SbcStudy:
-    """What the replicates of both surrogates share.
+    """Settings and inputs that the replicates of both surrogates share.
 
     Attributes:
         out: Directory of results.

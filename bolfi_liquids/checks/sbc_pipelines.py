@@ -42,7 +42,7 @@ class Observed:
 
 @dataclass(frozen=True)
 class Calibrate:
-    """What `calibrate` makes of a signal, as a pipeline of `inference.replicates`.
+    """Calibration of a signal as `calibrate` does it: a pipeline of `inference.replicates`.
 
     Attributes:
         stirring: The simulator; its recording's inclination is not looked at.

@@ -87,7 +87,7 @@ class OneLineErrors(TyperGroup):
 
 
 def _misused(err: TyperException) -> typer.Exit:
-    """How a mistyped command ends; a group without a command shows its help."""
+    """Exit of a mistyped command; a group without a command shows its help."""
     message = err.format_message()
     if message.startswith("Usage:"):
         typer.echo(message)
@@ -117,7 +117,7 @@ def _values(arguments: list[str]) -> Iterator[tuple[str, str]]:
 
 
 def explained(err: Exception) -> str:
-    """What happened and, where the disk or a file refused, what to do about it."""
+    """Text of an error and, where the disk or a file refused, its cure."""
     if (number := disk_errno(err)) is not None:
         where = getattr(err, "filename", None) or "a file that the command writes"
         cure = "make it writable" if number == errno.EROFS else "make room"
@@ -131,7 +131,7 @@ def explained(err: Exception) -> str:
 
 
 def how_to_go_on(arguments: list[str]) -> str:
-    """What a person is told who has interrupted a command that was typed so."""
+    """Sentence that says how an interrupted command, typed so, goes on."""
     from ..run.run import RUN_TOML
 
     again, begun = command(*arguments), True

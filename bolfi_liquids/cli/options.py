@@ -146,7 +146,7 @@ class ComputeOptions:
 
     @contextmanager
     def arguments(self) -> "Iterator[dict[str, Any]]":
-        """The same as `executor` and `timeout` of a function."""
+        """Yield the arguments `executor` and `timeout` of a function."""
         with self.opened() as compute:
             yield {"executor": compute.executor, "timeout": compute.timeout}
 

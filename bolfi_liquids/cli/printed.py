@@ -91,7 +91,7 @@ def print_findings(criticism: "Criticism") -> None:
 
 
 def print_warnings(results: "Results") -> None:
-    """What the report would warn of, each on a line of its own, however long."""
+    """Print the report's warnings, each on a line of its own, however long."""
     from ..reporting.warnings import warnings_of
 
     for warning in warnings_of(results):
@@ -109,7 +109,7 @@ def print_seconds(seconds: Mapping[str, float]) -> None:
 
 
 def print_checks(checks: "Sequence[Check]") -> None:
-    """What works and what is missing, one line each."""
+    """Print each check: passed, or its fault and cure."""
     from rich.markup import escape
     from rich.table import Table
 
@@ -120,7 +120,7 @@ def print_checks(checks: "Sequence[Check]") -> None:
 
 
 def print_recording(recording: "Recording") -> None:
-    """How long a recording is, and how it went."""
+    """Print a recording's duration and status."""
     import numpy as np
 
     seen = np.isfinite(recording.inclination).all(axis=1)

@@ -95,7 +95,7 @@ def record(  # noqa: PLR0913  an option each
 
 
 def next_commands(recording: Path, calibrated: Path | None) -> list[str]:
-    """What may follow a recording, which was perhaps calibrated into a RUN directory already."""
+    """Commands that may follow a recording, perhaps calibrated into a RUN directory already."""
     if calibrated is None:
         return [command("calibrate", recording, "--out", "RUN")]
     return [command("criticise", calibrated), command("pour", calibrated)]

@@ -119,7 +119,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
 def _find(
     calibration: Calibration, inputs: Inputs, compute: "Compute", report: "Report"
 ) -> "tuple[dict[str, inference.criticism.Criticism], int]":
-    """What the engine concludes, and how often it simulated clean recordings before."""
+    """Criticism of each source, and the number of simulations of clean recordings before."""
     particles = inputs.stirring.setups[0].particles
     clean = clean_residuals(
         inputs.baseline, particles, calibration.prior, compute=compute, report=report
@@ -178,7 +178,7 @@ def _pours(
     table: PourTable,
     how: Mapping[str, Any],
 ) -> "inference.criticism.Criticism":
-    """The same for pours, with the posterior of the stirs as the prior."""
+    """Criticise pours, with the posterior of the stirs as the prior."""
     from .. import inference
 
     cups, density, settings = inputs.cups, inputs.density, inputs.settings
@@ -208,6 +208,6 @@ def _pours(
 
 
 def _among(accept: Sequence[str] | None, extensions: Mapping[str, Any]) -> list[str] | None:
-    """Of the effects to accept, those that can act here; None leaves it to the verdict."""
+    """Effects to accept that can act here; None leaves it to the verdict."""
     here = [name for name in accept or () if name in extensions]
     return here or None

@@ -40,7 +40,7 @@ LABELS: dict[type, Any] = {str: "", int: -1, float: float("nan")}
 
 
 class EffectStatus(StrEnum):
-    """What became of an effect as an explanation; its spelling is that in criticism.nc."""
+    """Result of an effect as an explanation, spelled as in criticism.nc."""
 
     NAMED = "named"
     POSSIBLE = "possible"
@@ -205,7 +205,7 @@ def _effects(source: "inference.criticism.Criticism") -> "Dataset":
 def _status(
     candidate: "inference.criticism.Candidate", source: "inference.criticism.Criticism"
 ) -> EffectStatus:
-    """What became of an explanation by one effect."""
+    """Status of an explanation by one effect."""
     from ..inference.criticism.verdict import MIN_GAIN
 
     if candidate.names[0] in source.verdict.effects:

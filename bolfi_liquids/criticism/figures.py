@@ -102,7 +102,7 @@ def _rows(drawn: Panels, node: "DataTree") -> "Iterator[tuple[NDArray, Dataset, 
 
 
 def _size(recordings: int) -> tuple[float, float]:
-    """Of a figure with a row for each recording [inch]."""
+    """Width and height of a figure with a row for each recording [inch]."""
     return 8.6, 2.5 * recordings + 0.5
 
 
@@ -210,7 +210,7 @@ def _draw_pours(axes: "Axes", part: "Dataset") -> None:
 
 
 def score_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
-    """What each effect alone gains when it is fitted (left), and its score before (right).
+    """Draw the gain of each effect alone (left), and its score before the fit (right).
 
     Where no effect was fitted, there is no left side.
     """

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """What decides a criticism.
+    """Everything that decides a criticism.
 
     Attributes:
         after: Key of the posterior that is criticised.
@@ -50,12 +50,12 @@ class Inputs:
 
     @property
     def compared(self) -> tuple[Recording, ...]:
-        """What is given beside the recordings that were calibrated on."""
+        """Recordings beside those that were calibrated on."""
         return (*self.held_out, *self.baseline)
 
     @property
     def density(self) -> float:
-        """Of the liquid [kg/m3]."""
+        """Density of the liquid [kg/m3]."""
         return self.stirring.recordings[0].number("liquid_density")
 
     @cached_property
@@ -70,7 +70,7 @@ class Inputs:
 
     @property
     def made_from(self) -> dict[str, Any]:
-        """What a result was made from, as JSON: settings, and the SHA-256 of every file."""
+        """Settings and the SHA-256 of every file that decide a result, as JSON."""
         files = {
             "recordings": self.stirring.recordings,
             "held_out": self.held_out,

@@ -56,7 +56,7 @@ class Fractions:
 
     @property
     def noise(self) -> "PourNoise":
-        """Of these pours."""
+        """Noise of these pours."""
         return PourNoise(self.angular_velocity, self.distance)
 
     def __call__(

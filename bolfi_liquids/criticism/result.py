@@ -87,7 +87,7 @@ class Criticism:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """What the verdict names: the effect, or those that are tied."""
+        """Effects that the verdict names: one, or those that are tied."""
         return self.summary.effects
 
     @property
@@ -124,7 +124,7 @@ class Criticism:
         return shown(partial(figures.stroke_plot, self._of("stirs")), axes)
 
     def plot_scores(self, source: str = "stirs", axes: "ArrayLike | None" = None) -> "NDArray[Any]":
-        """How well each effect alone would explain the difference."""
+        """Draw how well each effect alone explains the difference."""
         return shown(partial(figures.score_plot, self._of(source)), axes)
 
     def plot_confusion(

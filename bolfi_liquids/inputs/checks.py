@@ -146,7 +146,7 @@ def _usual_step(recording: Recording, field: str) -> Measured:
 
 
 def clock_difference(time: NDArray, position: NDArray, inclination: NDArray) -> float:
-    """Of two logs of which one ends before the other begins [s]; 0 where they overlap.
+    """Gap between two logs of which one ends before the other begins [s]; 0 for overlap.
 
     Args:
         time: Times of all samples [s], shape (T,).
@@ -165,13 +165,13 @@ def _clock_difference(recording: Recording, field: str) -> Measured:
 
 
 def _part(recording: Recording, field: str) -> Measured:
-    """Of an outer size."""
+    """Outer size."""
     part, whole = recording.number(field), recording.number(OUTER[field])
     return part / whole, f" of {OUTER[field]} ({part:g} m of {whole:g} m)"
 
 
 def _made_density(recording: Recording, field: str) -> Measured:
-    """Of a stick that was weighed; 0 of one that was not."""
+    """Density of a stick that was weighed; 0 for one that was not."""
     volume = np.pi * recording.number("stick_radius") ** 2 * recording.number("stick_length")
     mass = float(recording.attrs.get("stick_mass", 0.0))
     return mass / volume, f" (of {mass:g} kg)"
@@ -283,7 +283,7 @@ def _beyond_rim(recording: Recording, field: str) -> Measured:
 
 
 def _lean_deg(recording: Recording, field: str) -> Measured:
-    """How far the stick leans [deg] behind a gripper that is fast; infinite where it is slow."""
+    """Lean of the stick behind a fast gripper [deg]; infinite where it is slow."""
     known = np.isfinite(recording.gripper.position).all(axis=1)
     time, position = recording.time[known], recording.gripper.position[known]
     apart = np.searchsorted(time, time[0] + SPEED_TIME)  # samples; so far apart noise is no speed
@@ -317,7 +317,7 @@ def _above_floor(recording: Recording, field: str) -> Measured:
 
 
 def _depth(recording: Recording, field: str) -> Measured:
-    """Of the tip in the liquid, at its lowest."""
+    """Depth of the tip in the liquid, at its lowest."""
     tip, fill = _lowest_tip(recording), recording.number("fill")
     return fill - tip, f" (the tip is {tip:g} m above the floor, the liquid is {fill:g} m deep)"
 

@@ -86,7 +86,7 @@ def named_faults(recordings: Iterable[Recording]) -> tuple[str, ...]:
 
 
 def frame_faults(recording: Recording) -> Iterator[str]:
-    """What is wrong with the frame of a recording; nothing where none is found."""
+    """Yield each fault of a recording's frame."""
     start = recording.time[0] if len(recording.time) else 0.0
     part = recording.first(int(np.searchsorted(recording.time, start + MAX_TIME)))
     position = part.gripper.position[:, :2]

@@ -231,7 +231,7 @@ def _check_action(value: float, limits: Limits, where: str) -> None:
 
 
 def _in_python(unit: str, where: str) -> str:
-    """What a function takes in another unit than a table or a command."""
+    """Text of the unit that a function takes, where tables and commands have another."""
     return f"; in Python, in {unit}" if isinstance(where, Argument) else ""
 
 

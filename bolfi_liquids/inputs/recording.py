@@ -94,7 +94,7 @@ class Recording:
         return html_table("Recording", {"file": self.path, **self.subjects()})
 
     def subjects(self) -> dict[str, str]:
-        """What it is of, by subject; without what the file does not say."""
+        """Texts about the recording by subject, as far as the file has them."""
         length = f"{self.time[-1] - self.time[0]:.1f} s" if len(self.time) else "0 s"
         parts = {
             subject: [_told(name, self.attrs[name]) for name in names if name in self.attrs]
@@ -184,7 +184,7 @@ def along_path(recording: Recording, inclination: NDArray) -> dict[str, NDArray]
 
 
 def as_recording(dataset: "Dataset", path: Path, content: bytes) -> Recording:
-    """What the variables and attributes of a recording's file mean; nothing is checked.
+    """Recording of a file's variables and attributes; nothing is checked.
 
     A few torn values are missing in the recording, and named in its `torn`.
 

@@ -134,7 +134,7 @@ def helped(text: str, **limits: Any) -> Any:
 
 @checked()
 class CalibrationSettings:
-    """What decides a calibration besides its recordings and prior."""
+    """Settings of a calibration, which is decided by them, its recordings and its prior."""
 
     budget: Annotated[Simulations, helped("Simulations of the search.")] = 20
     batch: Annotated[Count, helped("Simulations run at the same time.")] = 4
@@ -148,7 +148,7 @@ class CalibrationSettings:
 
 @checked()
 class SbcSettings:
-    """What decides a check of calibrations besides the recording that gives path and rig."""
+    """Settings of a check of calibrations; a recording gives path and rig."""
 
     runs: Annotated[
         Integer, helped("Replicates of the emulator of the inclination.", ge=0, le=MAX_COUNT)
@@ -187,7 +187,7 @@ class SbcSettings:
 
 @checked()
 class PourSettings:
-    """What decides the choice of a pour besides the posterior and the cups."""
+    """Settings of the choice of a pour, beside posterior and cups."""
 
     budget: Annotated[Pours, helped("Pours simulated at most, 24 to 100.")] = 64
     iterations: Annotated[Simulations, helped("Angular velocities tried.")] = 31
@@ -198,7 +198,7 @@ class PourSettings:
 
 @checked()
 class CriticismSettings:
-    """What decides a criticism besides its data."""
+    """Settings of a criticism, beside its data."""
 
     effects: Annotated[Names, helped("Effect to consider, else all. Repeatable.")] = None
     accept: Annotated[Names, helped("Effect to add whatever the verdict. Repeatable.")] = None

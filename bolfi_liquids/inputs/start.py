@@ -89,7 +89,7 @@ def _usual(recording: Recording) -> tuple[float, float, float]:
 def _fault(
     recording: Recording, first: int, fast: float, still: float, noise: float
 ) -> tuple[str, str] | None:
-    """What speaks against a start at a sample: the field, and what it does."""
+    """Reason against a start at a sample: the field, and its behaviour."""
     if (above := above_liquid(recording, first)) >= 0.0:
         return "z", f"starts with the stick in the air, {100.0 * above:.1f} cm above the liquid"
     speed, error = _first_speed(recording, first, still)

@@ -153,7 +153,7 @@ class Attributes(Given):
 
 
 class TableMap(Given):
-    """How to read a recording out of a table.
+    """Map from a table's columns to a recording.
 
     Attributes:
         delimiter: Between two cells; None follows the rule of `table`.
@@ -342,7 +342,7 @@ def at_camera_times(values: dict[str, NDArray]) -> tuple[dict[str, NDArray], str
 
 
 def outline(recording: Recording) -> str:
-    """What was read, in a few lines that show a wrong unit or sign at a glance."""
+    """Outline of a recording in a few lines that show a wrong unit or sign at a glance."""
     path = recording.gripper.position
     reach, fastest = np.nanmax(path, axis=0) - np.nanmin(path, axis=0), np.nanmax(speed(recording))
     lines = [
@@ -361,7 +361,7 @@ def outline(recording: Recording) -> str:
 
 
 def _warnings(recording: Recording) -> Iterator[str]:
-    """What `calibrate` would warn of, or refuse."""
+    """Warnings and refusals of `calibrate`."""
     yield from recording.torn
     yield from frame_faults(recording)
     try:

@@ -110,7 +110,7 @@ def _filled(view: OrthographicView, receiver: Glass, depth: float) -> list[Shape
 
 
 def _puddle(spilled: NDArray, cups: "Cups") -> list[Shape]:
-    """What lies on the table around places [n, 2]."""
+    """Shapes of the liquid on the table around places [n, 2]."""
     centres = PUDDLE_CELL * np.unique(np.rint(spilled / PUDDLE_CELL), axis=0)
     table = np.full(len(centres), -cups.pour.lip_height)
     turn = np.linspace(0.0, 2.0 * np.pi, 25)
@@ -119,7 +119,7 @@ def _puddle(spilled: NDArray, cups: "Cups") -> list[Shape]:
 
 
 class Landed(NamedTuple):
-    """Of one frame.
+    """Liquid that has landed by one frame.
 
     Attributes:
         falling: Particles between the rim and where they come to rest [m], shape [m, 3].
@@ -135,7 +135,7 @@ class Landed(NamedTuple):
 def landed(
     landings: "Landings", before: int, count: int, interval: float, cups: "Cups", distance: float
 ) -> Landed:
-    """What has become of the first `count` particles that passed the rim, of one pour.
+    """Place the first `count` particles of a pour that passed the rim.
 
     The simulation ends at the rim. From there each falls as a stone that left the lip at rest
     upright and reached the rim where it did; those of the last interval passed it one after

@@ -70,7 +70,7 @@ class OrthographicView:
         return np.array([[c, s, 0.0], [-s * t, c * t, d], [s * d, -c * d, t]])
 
     def camera(self, points: NDArray) -> NDArray[np.float64]:
-        """How far right, up and towards the camera of the centre points [..., 3] are [m]."""
+        """Points [..., 3] right, up and towards the camera from the centre [m]."""
         return (np.asarray(points, np.float64) - self.centre) @ self.axes.T
 
     def pixels(self, points: NDArray) -> NDArray[np.float64]:
@@ -81,7 +81,7 @@ class OrthographicView:
         return np.stack([middle[0] + self.scale * right, middle[1] - self.scale * up], axis=-1)
 
     def metres(self) -> tuple[NDArray, NDArray]:
-        """How far right [width] and up [height, 1] of the centre each pixel is [m]."""
+        """Place of each pixel right [width] and up [height, 1] from the centre [m]."""
         right = (np.arange(self.width) - (self.width - 1) / 2.0) / self.scale
         up = ((self.height - 1) / 2.0 - np.arange(self.height)) / self.scale
         return right, up[:, None]
@@ -126,7 +126,7 @@ class Glass:
 
 
 class VisibleSurface(NamedTuple):
-    """What the pixels of a window of the picture show of the liquid.
+    """Liquid that the pixels of a window of the picture show.
 
     Attributes:
         window: Rows and columns of the picture.
@@ -191,7 +191,7 @@ def surface(
 
 
 def _distance_to(some: NDArray) -> NDArray:
-    """Of each pixel to the nearest of some, in pixels."""
+    """Distance of each pixel from the nearest of some, in pixels."""
     return np.asarray(distance_transform_edt(~some))
 
 

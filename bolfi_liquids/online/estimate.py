@@ -32,7 +32,7 @@ DRAWS_EACH = 500  # of each of two chains
 
 
 class OnlineEstimate(NamedTuple):
-    """What is known after a stroke.
+    """Estimate after a stroke.
 
     Attributes:
         strokes: Finished.
@@ -87,7 +87,7 @@ Made = tuple[tuple["Job", "Simulation"], ...]
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What stays the same during a stir.
+    """Constants of a stir.
 
     Attributes:
         prior: Of the liquid.
@@ -101,12 +101,12 @@ class Problem:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Of one signal."""
+        """Shape of one signal."""
         return self.stirring.observed.shape
 
 
 class Answer(NamedTuple):
-    """What data so far have led to.
+    """Answer to the data so far.
 
     Attributes:
         aligned: The data, if they tell more than those before.

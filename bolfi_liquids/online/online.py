@@ -58,7 +58,7 @@ SIMULATOR_NICENESS = 10  # an estimate matters more than another simulation
 
 
 class OnlineChoice(NamedTuple):
-    """What to calibrate, for which pour, and where.
+    """Choices of an online calibration: its run, cups and settings.
 
     Attributes:
         run: The RUN directory to be made.

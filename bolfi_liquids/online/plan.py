@@ -93,7 +93,7 @@ def align(plan: Recording, ends: NDArray, so_far: PartialRecording) -> Aligned:
 def _delays(
     plan: Recording, ends: NDArray, so_far: PartialRecording
 ) -> tuple[NDArray[np.float64], float]:
-    """Of each finished stroke and of the one that is not [s], and the arm's greatest distance.
+    """Delay of each stroke, finished or not [s], and the arm's greatest distance.
 
     Returns:
         Delays, shape (finished + 1,), and the distance from the plan that they leave [m].
@@ -116,7 +116,7 @@ def _delays(
 
 
 def _distance(plan: Recording, time: NDArray, position: NDArray) -> NDArray[np.float64]:
-    """Of the arm from its plan [m], shape (S,)."""
+    """Distance of the arm from its plan [m], shape (S,)."""
     wanted = np.column_stack([np.interp(time, plan.time, axis) for axis in plan.gripper.position.T])
     return np.linalg.norm(position - wanted, axis=1)
 

@@ -79,7 +79,7 @@ def record_online(
 
 @dataclass
 class Learning:
-    """What is learned while the arm stirs.
+    """Online calibration while the arm stirs.
 
     Attributes:
         calibration: Learns.

@@ -1,4 +1,4 @@
-"""What decides an online calibration besides plan, cups and data."""
+"""Settings of an online calibration, beside plan, cups and data."""
 
 from typing import Annotated
 
@@ -22,7 +22,7 @@ WHERE = "online setting {}"
 
 @checked(WHERE)
 class OnlineSettings:
-    """What decides an online calibration besides plan, cups and data.
+    """Settings of an online calibration, beside plan, cups and data.
 
     Attributes:
         target: Stirring may end where only one pour in twenty spills more than this fraction.

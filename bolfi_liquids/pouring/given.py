@@ -32,12 +32,12 @@ NODES = 7  # at which an expectation over the process is computed
 
 
 def angle(share: NDArray) -> NDArray[np.float64]:
-    """Of shares."""
+    """Angles of shares."""
     return np.arcsin(np.sqrt(np.clip(share, 0.0, 1.0)))
 
 
 def share(angle: NDArray) -> NDArray[np.float64]:
-    """Of angles, those beyond nothing or all taken there."""
+    """Shares of angles; an angle beyond its ends counts as nothing or all."""
     return np.sin(np.clip(angle, 0.0, np.pi / 2.0)) ** 2
 
 
@@ -49,7 +49,7 @@ def expected_share(mean: NDArray, sd: NDArray) -> NDArray[np.float64]:
 
 
 class Residual(NamedTuple):
-    """Of one share that was observed in A given pours; see `learn_residual`.
+    """Residual of one share that was observed in A given pours; see `learn_residual`.
 
     Attributes:
         at: `action_coordinates` of the given pours, shape (A, 2).
@@ -66,7 +66,7 @@ class Residual(NamedTuple):
     def moved(
         self, here: NDArray, there: NDArray, at: NDArray
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """What n outcomes predict of m actions, as the given pours say.
+        """Move predictions of n outcomes for m actions by the given pours.
 
         Args:
             here: Angles that the outcomes predict of the given pours, shape (n, A).
@@ -88,16 +88,16 @@ class Residual(NamedTuple):
 
     @property
     def given_covariance(self) -> NDArray[np.float64]:
-        """Of the given pours about an outcome, shape (A, A)."""
+        """Covariance of the given pours about an outcome, shape (A, A)."""
         return self.covariance(self.at, self.at) + REPEATABILITY_SD**2 * np.eye(len(self.at))
 
     def covariance(self, a: NDArray, b: NDArray) -> NDArray[np.float64]:
-        """Of the process between coordinates (n, 2) and (m, 2), shape (n, m)."""
+        """Covariance of the process between coordinates (n, 2) and (m, 2), shape (n, m)."""
         apart = np.sum(((a[:, None] - b) / self.lengths) ** 2, axis=-1)
         return self.sd**2 * np.exp(-0.5 * apart)
 
     def log_density(self, here: NDArray) -> float:
-        """Of the given pours, where outcomes predict angles `here` of them, (n, A); less a
+        """Log density of the given pours, for which outcomes predict angles `here` (n, A), less a
         constant."""
         whole = self.given_covariance + _spread(here, here)
         left = self.observed - here.mean(axis=0)
@@ -150,7 +150,7 @@ class GivenPours:
     retained: Residual
 
     def surface(self, there: Surface, here: NDArray) -> Surface:
-        """What actions may be expected to spill.
+        """Expected spillage of actions.
 
         Args:
             there: What the map says of them.
@@ -163,7 +163,7 @@ class GivenPours:
         return there._replace(spilled=expected_share(*moved).reshape(there.spilled.shape))
 
     def outcomes(self, there: Judged, here: NDArray, seed: int) -> Judged:
-        """What becomes of the liquid in the n outcomes of an action.
+        """Correct the n outcomes of an action.
 
         Args:
             there: What the map says of them.

@@ -65,11 +65,11 @@ class LandingMap:
 
     @property
     def pours(self) -> int:
-        """That were learned from."""
+        """Number of pours that were learned from."""
         return len(self.poured.rows)
 
     def profiles(self, rates: NDArray, liquids: Mapping[str, NDArray], misses: NDArray) -> Profiles:
-        """What liquids spill at angular velocities [rad/s], (W,), of receivers at any distance.
+        """Spillage of liquids at angular velocities [rad/s], (W,), with receivers at any distance.
 
         Args:
             rates: Within the range of the cups.
@@ -88,7 +88,7 @@ class LandingMap:
     def surface(
         self, liquids: Mapping[str, NDArray], *, rates: int = RATES, seed: int = 0
     ) -> Surface:
-        """What every action may be expected to spill of liquids that might be in the cup.
+        """Expected spillage of every action over liquids that might be in the cup.
 
         Each draw meets one of the map's errors, the same for all actions, which then differ by what
         they are and not by luck. Few draws are repeated, so that they meet errors of all kinds.
@@ -109,7 +109,7 @@ class LandingMap:
     def judge(
         self, action: Mapping[str, float], liquids: Mapping[str, NDArray], *, seed: int = 0
     ) -> Judged:
-        """What an action spills of liquids, each at `LANDINGS_PER_DRAW` places where it may land.
+        """Spillage of an action over liquids, each landing at `LANDINGS_PER_DRAW` places.
 
         Args:
             action: `angular_velocity` [rad/s] and `distance` [m].
@@ -154,13 +154,13 @@ class LandingMap:
 
     @property
     def rms_error(self) -> float:
-        """Of the spilled fraction, over pours that were left out and all distances."""
+        """RMS error of the spilled fraction, over pours that were left out and all distances."""
         return float(np.sqrt(np.mean(self.error**2)))
 
     def corrected(
         self, table: PourTable, liquids: Mapping[str, NDArray], *, seed: int = 0
     ) -> "LandingMap":
-        """The same map, with what pours that were made say of it.
+        """Map that given pours of the liquid correct.
 
         Args:
             table: The pours, within the range of the cups.

@@ -44,7 +44,7 @@ LIQUIDS = 4  # that one pair of lanes pours at once
 
 
 def joint_prior(liquid: "Prior", names: Iterable[str], cups: "Cups") -> "Prior":
-    """Of viscosity, cohesion, coefficients of effects, and the angular velocity.
+    """Prior of viscosity, cohesion, coefficients of effects, and the angular velocity.
 
     Args:
         liquid: Of viscosity and cohesion at least.
@@ -199,8 +199,8 @@ def pours_in(
 
 
 def _in_bank(box: Box, pours: PourSimulator, bank: "SimulationBank") -> Iterator[Poured]:
-    """What the bank holds inside of the box, by the effects with which it was poured; what was
-    poured without an effect has its neutral coefficient."""
+    """Pours of the bank inside of the box, by the effects with which they were poured; a pour
+    made without an effect has its neutral coefficient."""
     from ..models import EFFECTS
 
     for size in range(len(pours.effects) + 1):
@@ -221,7 +221,7 @@ def _in_bank(box: Box, pours: PourSimulator, bank: "SimulationBank") -> Iterator
 
 @dataclass(frozen=True)
 class Hold:
-    """How the source empties; see `hold_of`.
+    """Emptying of the source; see `hold_of`.
 
     Attributes:
         until_tenth_s: Time after which a tenth of the liquid stays, in the mean over the posterior
@@ -263,7 +263,7 @@ def hold_of(
     compute: "Compute",
     advance: Advance = silent,
 ) -> Hold:
-    """How a source that is turned at a rate [rad/s] empties.
+    """Learn how a source empties that is turned at a rate [rad/s].
 
     Args:
         draining: The simulator of `Draining`.

@@ -194,7 +194,7 @@ class GivenPour:
 
     @property
     def contradiction(self) -> float:
-        """How much more or less was spilled than the map expects."""
+        """Absolute difference of the spilled fraction from the map's expectation."""
         return abs(self.spilled - self.expected_spillage)
 
 

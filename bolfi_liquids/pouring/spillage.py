@@ -41,7 +41,7 @@ RISK: dict[str, Callable[[NDArray], NDArray]] = {"mean": mean_spillage, "cvar": 
 
 
 def landing_sd(cups: "Cups") -> float:
-    """How far from where it was simulated the liquid lands [m].
+    """Sd of the distance between simulated and true landing [m].
 
     The simulator, as every one, misses the speed and direction at which liquid leaves the lip,
     and the error grows with the fall. Against 11 pours of a volume-of-fluid solver it is 0.023 of
@@ -73,7 +73,7 @@ class Profiles(NamedTuple):
 
 
 class Surface(NamedTuple):
-    """What actions may be expected to spill.
+    """Expected spillage of actions.
 
     Attributes:
         angular_velocity: [rad/s], shape (W,).
@@ -148,7 +148,7 @@ def reachable_distances(cups: "Cups") -> NDArray[np.float64]:
 
 
 def surface(profiles: Profiles, cups: "Cups") -> Surface:
-    """What the actions of the decision's range spill, wherever the liquid lands."""
+    """Spillage of the actions of the decision's range, wherever the liquid lands."""
     from scipy.ndimage import gaussian_filter1d
 
     blurred = gaussian_filter1d(

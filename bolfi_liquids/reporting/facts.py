@@ -70,7 +70,7 @@ NONE = "–"
 
 
 def calibration_facts(calibration: Calibration) -> Facts:
-    """Of the search, the posterior and the fit.
+    """Facts of the search, the posterior and the fit.
 
     Args:
         calibration: Without what a criticism accepted.
@@ -110,7 +110,7 @@ def _untested_cells(calibration: Calibration) -> str | None:
 
 
 def fit_facts(summary: CalibrationSummary) -> Facts:
-    """Of the fit and the sampler, whichever effects were added."""
+    """Facts of the fit and the sampler, whichever effects were added."""
     alike = summary.below_least_viscosity
     ratio = summary.fit_rms_deg / summary.noise_deg
     near = summary.unexplained_deg <= FIT_NEAR_NOISE * summary.noise_deg
@@ -148,7 +148,7 @@ def _parameter(name: str, values: ParameterSummary) -> Facts:
 
 
 def _learned(values: ParameterSummary, prior: "NDArray[np.float64]") -> Facts:
-    """What a posterior has learned beside draws (n,) from its prior."""
+    """Facts of a posterior beside draws (n,) from its prior."""
     low, high = np.searchsorted(np.sort(prior), (values.q05, values.q95)) / len(prior)
     share = float(high - low) / 0.9
     return {
@@ -159,7 +159,7 @@ def _learned(values: ParameterSummary, prior: "NDArray[np.float64]") -> Facts:
 
 
 def criticism_facts(criticism: Criticism) -> Facts:
-    """Of a criticism: the verdicts, what it accepted, and the rows of its tables."""
+    """Facts of a criticism: verdicts, accepted effects, and the rows of its tables."""
     summary, sources = criticism.summary, dict(criticism.tree.children)
     del sources["posterior"]
     effects, held = _rows(sources["stirs"], "effects"), _held_out(sources["stirs"])
@@ -251,7 +251,7 @@ def _verdict(data: str, found: CriticismSummary | SourceVerdict) -> Facts:
 
 
 def _coefficient(name: str, values: ParameterSummary) -> Facts:
-    """How large an accepted effect is, and what it is."""
+    """Facts of an accepted effect: its size and meaning."""
     from ..models import EFFECTS
 
     effect = EFFECTS.get(name)  # a user's own may not be registered in this process
@@ -322,7 +322,7 @@ def _most_similar(name: str, cosine: Any) -> str:
 
 
 def pour_facts(pour: Pour) -> Facts:
-    """Of the chosen pour, and of the one that is best for the most probable liquid alone."""
+    """Facts of the chosen pour, and of the best one for the most probable liquid alone."""
     summary, cups = pour.summary, json.loads(pour.tree.attrs["cups"])
     return {
         **_action(summary),

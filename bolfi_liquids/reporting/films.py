@@ -62,7 +62,7 @@ class Film(NamedTuple):
 
     @property
     def scene(self) -> str:
-        """What happens."""
+        """Scene of the film: stir or pour."""
         return "pour" if self.action else "stir"
 
     @property

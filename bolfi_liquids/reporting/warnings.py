@@ -41,7 +41,7 @@ class Results:
 
     @property
     def latest(self) -> Calibration:
-        """What is poured: the calibration, with what a criticism accepted."""
+        """Calibration that is poured by: extended by the effects that a criticism accepted."""
         return self.calibration if self.criticism is None else self.criticism.calibration
 
     @property

@@ -23,7 +23,7 @@ REFRESH_RATE = 5.0  # per second, of the live view
 
 
 class Task(NamedTuple):
-    """What an arm is to do.
+    """Motion of an arm, and where it is recorded.
 
     Attributes:
         rig: What is there.

@@ -91,7 +91,7 @@ def execute_pour(
 
 
 def dry_pour(run: RunOrPath, rig: "Rig") -> "tuple[str, list[Check]]":
-    """What the arm would do, and the pre-flight list of a session that cannot move it.
+    """Text of the planned pour, and the pre-flight list of a session that cannot move the arm.
 
     Raises:
         InputError, MotionRejected: As `chosen_pour` and `plan_pour`.
@@ -101,7 +101,7 @@ def dry_pour(run: RunOrPath, rig: "Rig") -> "tuple[str, list[Check]]":
 
 @dataclass(frozen=True)
 class ChosenPour:
-    """What is to be carried out, and what a person should know before it is.
+    """Pour to be carried out, with its warnings.
 
     Attributes:
         pour: As the run has chosen it.

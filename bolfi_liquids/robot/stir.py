@@ -17,7 +17,7 @@ PATHS_AHEAD = 2  # paths ordered beyond the one that runs, so that the arm need 
 
 
 class StirPlan(NamedTuple):
-    """What the arm will do once it is above the cup, all of it within the rig's limits.
+    """Paths of the arm from above the cup on, all of them within the rig's limits.
 
     Attributes:
         insert: Down into the liquid.

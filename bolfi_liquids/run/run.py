@@ -267,7 +267,7 @@ class Run:
 
     @cached_property
     def prior(self) -> "Prior":
-        """Of the parameters, before stirring."""
+        """Prior of the parameters."""
         return read_prior(self.record["settings"]["prior"])
 
     def tell_missing_bank(self) -> None:
@@ -308,7 +308,7 @@ class Run:
         return self._look(step)[1] if there else ""
 
     def required(self, step: str) -> "DataTree":
-        """The same as `result`.
+        """Result of a step, which must be current.
 
         Raises:
             InputError: There is none; the message says why, and which command makes it.
@@ -353,7 +353,7 @@ class Run:
 
     @property
     def made_from(self) -> dict[str, Any]:
-        """What decides the calibration."""
+        """Settings, inputs and versions that decide the calibration."""
         return {name: self.record.get(name) for name in (*MUST_AGREE, "files")}
 
     def posterior_key(self) -> str:
@@ -522,7 +522,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _way_out(path: Path) -> str:
-    """What to do where run.toml is lost, but not the recordings; "" where they are, too."""
+    """Cure where run.toml is lost, but not the recordings; "" where they are lost, too."""
     if not (copies := sorted((path / RECORDINGS).glob("*.nc"))):
         return ""
     anew = command("calibrate", *copies, "--out", _beside(path, "anew"))

@@ -301,7 +301,7 @@ def _normal(grid: Grid, distance: Distance, points: np.ndarray) -> np.ndarray:
 
 
 def _rub(squared: np.ndarray) -> np.ndarray:
-    """How much a wall rubs at the component along an axis, from its normal n's n² there.
+    """Friction factor of a wall for the component along an axis, from its normal's n² there.
 
     A wall holds what flows along it and lets go what flows off. Each component has a coefficient
     of its own; these make the power of any flow around or along a cylinder that of its speed:

@@ -105,7 +105,7 @@ def beyond(s, g, a, face, step):
 
 @ti.func
 def takers(s, g, a, m, step):
-    """How many surfaces take what acts on a face: 0 to 2, and 0 if it is one itself."""
+    """Number of surfaces that take the force on a face: 0 to 2, and 0 if it is one itself."""
     o = m - step
     neither = (1.0 - filled(s, g, m)) * (1.0 - filled(s, g, o))
     return neither * (near_filled(s, g, a, m, step) + near_filled(s, g, a, o, -step))
