@@ -121,8 +121,10 @@ def told_signals(
     """
     due = "an array of numbers" if shape is None else shape
     try:
-        told: list[np.ndarray | str] = list(signals_of(given, n, shape)) if n else []
+        told: list[np.ndarray | str] = list(signals_of(given, n, shape))
     except Unusable as error:
+        if (error.shape or ())[:1] == (n,) == (0,):  # an empty list says nothing of a signal
+            return (), []
         if isinstance(given, np.ndarray) and given.dtype == object and given.ndim == 1:
             given = given.tolist()
         listed = given if isinstance(given, list | tuple) and len(given) == n else []
