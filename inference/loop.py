@@ -187,7 +187,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
         compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         bar = progress_bar("simulations", budget + confirm, shown=progress, at_least=confirm > 0)
         advance = stack.enter_context(bar)
-        runner = stack.enter_context(Runner(simulator, compute, engine.expected_shape, identity))
+        runner = stack.enter_context(
+            Runner(simulator, compute, shape=engine.expected_shape, identity=identity)
+        )
         schedule = _in_rounds if in_rounds else _in_flight
         finished = schedule(engine, runner, budget, batch)
         seconds = 0.0
@@ -259,9 +261,11 @@ def fit_losses(
     Warns:
         EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
     """
-    one = (noise is None) != (n is None)
-    due = "be one, the sd of the data's noise or the number of data in a loss"
-    require(one, "either noise= or n=", due, (noise, n))
+    if (noise is None) == (n is None):
+        raise ValueError(
+            "give exactly one of noise=, the sd of the data's noise, and n=, the number of data in "
+            f"a loss, got noise={noise!r:.100} and n={n!r:.100}"
+        )
     engine = Bolfi(prior, surrogate="log_likelihood", initial=MIN_LEARN)
     losses, m = checked_array("loss", loss), len(np.atleast_2d(prior.to_array(theta)))
     require(losses.shape == (m,), "loss", f"have shape ({m},), one per theta", losses.shape)

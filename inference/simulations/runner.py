@@ -46,6 +46,7 @@ class Runner:
         self,
         simulate: Simulator,
         compute: Compute,
+        *,
         shape: tuple[int, ...] | None = None,
         identity: str = "",
     ):
@@ -272,7 +273,7 @@ def run_missing(
     """
     at_once = None if compute.executor is not None else compute.batch
     results = []
-    with Runner(simulate, compute, shape, identity) as runner:
+    with Runner(simulate, compute, shape=shape, identity=identity) as runner:
         for part in batched(jobs, at_once or max(len(jobs), 1)):
             for outcome in runner.start(part):
                 results.append(runner.result(outcome))

@@ -213,7 +213,7 @@ VALUES = {
         *({"units": given} for given in ({"b": "m"}, {"a": 1.0}, ["m"], "m")),
     ],
     "Prior of one": [
-        ("a", {"distributions": {"a": one}})
+        ("thickness", {"distributions": {"thickness": one}})
         for one in (
             *(dist.Uniform(1.0, 0.0), dist.Uniform(1.0, 1.0), dist.LogUniform(2.0, 1.0)),
             *(dist.Uniform(0.0, np.inf), dist.Uniform(np.nan, 1.0), dist.Normal(0.0, np.inf)),
@@ -334,6 +334,14 @@ def test_a_value_out_of_range_is_refused_by_its_argument(cases, name):
         found = refusal(call, good | given, argument)
         wrong += [(row, found)] if found else []
     assert not wrong
+
+
+def test_a_bank_is_refused_with_what_it_may_be(cases):
+    call, good = cases["fit"]
+    due = r"^bank must be the path of a file or a SimulationBank, got "
+    for wrong in (3, "", b"runs.sqlite"):
+        with pytest.raises(ValueError, match=due):
+            call(**good, bank=wrong)
 
 
 def test_a_pool_that_forks_is_refused(cases):

@@ -40,7 +40,7 @@ GAPPY = np.where(np.arange(30) == 3, np.nan, OBSERVED)
 UNSEEN = experiment(observed=np.zeros(30), label="unseen")
 GOOD = {
     "experiment": experiment(),
-    "prior": inference.Prior({"a": dist.Uniform(0.0, 1.0)}),
+    "prior": inference.Prior({"thickness": dist.Uniform(0.0, 1.0)}),
     "extensions": {"drift": criticism.Extension(POSITIVE)},
 }
 
@@ -52,8 +52,8 @@ GOOD = {
         ({"prior": {"a": POSITIVE}}, "prior"),
         ({"extensions": {}}, "extensions"),
         ({"extensions": {"drift": POSITIVE}}, "drift"),
-        ({"extensions": {"a": criticism.Extension(POSITIVE)}}, "a"),
-        ({"earlier": ({"a": [0.5]}, np.zeros((1, 30)))}, "earlier"),
+        ({"extensions": {"thickness": criticism.Extension(POSITIVE)}}, "thickness"),
+        ({"earlier": ({"thickness": [0.5]}, np.zeros((1, 30)))}, "earlier"),
         ({"held_out": UNSEEN}, "held_out"),
         ({"held_out": [experiment(observed=OBSERVED.copy(), label="copy")]}, "copy"),
         (
