@@ -125,7 +125,7 @@ def open_executor(
         context = given._mp_context if isinstance(given, ProcessPoolExecutor) else None
         forks = context is not None and context.get_start_method() == "fork"
         due = "start no workers by fork, which JAX's threads do not survive"
-        require(not forks, "executor", due, given, SPAWNING)
+        require(not forks, "executor", due, given, cure=SPAWNING)
         if one_thread:
             _check_one_thread(given)
         yield given
@@ -133,7 +133,8 @@ def open_executor(
 
 def _check_one_thread(executor: Executor | None) -> None:
     due = "be no threads, for the simulator serves only one of a process"
-    require(not isinstance(executor, ThreadPoolExecutor), "executor", due, executor, SPAWNING)
+    threaded = isinstance(executor, ThreadPoolExecutor)
+    require(not threaded, "executor", due, executor, cure=SPAWNING)
     client = getattr(executor, "_client", None)  # of Dask's executor; there is no public way
     for worker, threads in client.nthreads().items() if isinstance(client, DaskClient) else ():
         if threads > 1:
