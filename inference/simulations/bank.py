@@ -243,7 +243,7 @@ def _key(identity: str, theta: Mapping[str, float], seed: int) -> tuple[str, str
 
 
 def _digest(row: Sequence[Any]) -> bytes:
-    """Of identity, theta, seed, signal, dtype, shape, kind of failure, error and seconds."""
+    """SHA-256 of identity, theta, seed, signal, dtype, shape, failure, error and seconds."""
     signal = row[3] or b""
     return sha256(repr((*row[:3], *row[4:])).encode() + signal).digest()
 

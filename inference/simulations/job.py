@@ -272,7 +272,7 @@ def _one_call(
 
 
 def signals_of(returned: object, n: int, shape: tuple[int, ...] | None) -> np.ndarray:
-    """What a simulator returned for n runs: float64 [n, *shape].
+    """Signals that a simulator returned for n runs, float64 [n, *shape].
 
     Args:
         shape: Of one signal; None accepts any.
@@ -306,7 +306,7 @@ def misshapen(
 
 
 def within[R](timeout: float | None, call: Callable[[], R], limit: Limit | None = None) -> R:
-    """What `call` returns or raises, if it does so in `timeout` seconds.
+    """Return or raise as `call` does, if it does so in `timeout` seconds.
 
     With a `limit` the call stops itself, in this thread. Else it runs in a thread of its own.
     Python cannot stop a thread: one that is overdue is abandoned, and goes on, unheard, until it

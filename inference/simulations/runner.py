@@ -212,7 +212,7 @@ class Runner:
             self.bank.release(self.identity, *job)
 
     def _explained(self, error: BaseException, submitting: bool = False) -> BaseException:
-        """What to tell the user of an executor's own error."""
+        """An executor's own error in the user's terms."""
         if isinstance(error, BrokenExecutor | CancelledError):
             jobs = "; ".join(f"{job.theta}, seed {job.seed}" for job in list(self._mine.values()))
             told = RuntimeError(
