@@ -148,6 +148,30 @@ def test_a_claim_of_a_process_ends_with_it(tmp_path):
                 late.kill()
 
 
+WRITE_50 = """
+import sys
+import numpy as np
+from bolfi_liquids import inference
+from bolfi_liquids.inference import simulations
+with inference.SimulationBank(sys.argv[1]) as bank:
+    for seed in range(int(sys.argv[2]), int(sys.argv[2]) + 50):
+        bank.put("id", {"a": 1.0}, seed, simulations.Simulation(np.full(20, seed), None, 0.0))
+"""
+
+
+def test_processes_may_write_a_file_at_once(tmp_path):
+    """The same rows, too."""
+    path = tmp_path / "shared.sqlite"
+    workers = [
+        subprocess.Popen([sys.executable, "-c", WRITE_50, str(path), first])
+        for first in ("0", "25")
+    ]
+    assert [worker.wait(60.0) for worker in workers] == [0, 0]
+    with inference.SimulationBank(path) as bank:
+        assert len(bank) == 75
+        np.testing.assert_array_equal(bank.simulations("id").signals[:, 0], np.arange(75.0))
+
+
 TOGETHER = """
 import sys, time
 from concurrent.futures import ThreadPoolExecutor
