@@ -369,6 +369,14 @@ def test_a_pool_that_forks_is_refused(cases):
         assert refusal(call, good | {"executor": pool}, "executor") == ""
 
 
+def test_an_executor_that_is_no_pool_of_processes_may_hold_what_it_likes():
+    class Other(ThreadPoolExecutor):
+        _mp_context = multiprocessing.get_context("fork")
+
+    with Other(1) as pool, open_compute(executor=pool) as compute:
+        assert compute.executor is pool
+
+
 def test_a_simulator_of_one_thread_takes_no_pool_of_threads():
     with ThreadPoolExecutor(1) as pool:
         assert refusal(*MORE["open_compute"], "executor") == "it is taken"
