@@ -1,4 +1,4 @@
-"""What users give, and what their code returns: made what it should be, or refused by name.
+"""Values that users give and that their code returns: made what they should be, or refused by name.
 
 Loads nothing but NumPy, for workers import it.
 """
@@ -102,7 +102,7 @@ def described(value: object) -> str:
     return f"an object of type {kind}"
 
 
-def require(fits: object, name: str, due: str, got: object, cure: str = "") -> None:
+def require(fits: object, name: str, due: str, got: object, *, cure: str = "") -> None:
     """Raise ValueError, "{name} must {due}, got {got}; {cure}", unless it fits."""
     if not fits:
         raise ValueError(f"{name} must {due}, got {got!r:.100}{cure and f'; {cure}'}")

@@ -97,8 +97,8 @@ class Bolfi(Displayed):
         self.asked = 0
         self._designed = 0  # points asked of the start design's sequence
         self._rounds = 0  # calls of `ask` and `confirm`
-        self._pending: list[list[float]] = []  # theta asked and not yet told
-        self._pending_rounds: list[int] = []
+        # theta asked and not yet told, and in which round; rebound, for copies share it
+        self._pending: tuple[tuple[list[float], int], ...] = ()
         self._learned: Any = None  # the family's surrogate, once there is one
         self._before: Before | None = None  # the posterior of which `confirm` drew
         self._seconds = 0.0
@@ -168,8 +168,7 @@ class Bolfi(Displayed):
 
     def _ask(self, theta: np.ndarray, started: float) -> dict[str, np.ndarray]:
         """theta [n, d] as it is asked, name -> [n]."""
-        self._pending += theta.tolist()
-        self._pending_rounds += [self._rounds] * len(theta)
+        self._pending += tuple((point, self._rounds) for point in theta.tolist())
         self._rounds += 1
         self.asked += len(theta)
         self._seconds += time.perf_counter() - started
@@ -185,7 +184,8 @@ class Bolfi(Displayed):
     @in_float64
     def _acquired(self, n: int, designed: np.ndarray) -> np.ndarray:
         """theta [n, d] of the engine's choice, `designed` [m, d] being asked with them."""
-        pending = np.reshape(self._pending + designed.tolist(), (-1, len(self.prior)))
+        points = [point for point, _ in self._pending] + designed.tolist()
+        pending = np.reshape(points, (-1, len(self.prior)))
         words = self._words()
         found = self.family.search(self._training_data(), words, self._learned)
         self._learned = checked_surrogate(found, self.family)
@@ -253,7 +253,9 @@ class Bolfi(Displayed):
         check_support(self.prior, self.prior.to_dict(natural))
         told = self._history(natural, outputs, told_seeds(seeds, n), faults, errors)
         self._check_compared(told)
-        self.history = self.history.and_then(told._replace(rounds=self._settled(natural)))
+        rounds, pending = self._settled(natural)
+        history = self.history.and_then(told._replace(rounds=rounds))
+        self.history, self._pending = history, pending
         self._seconds += time.perf_counter() - started
 
     def _history(
@@ -298,16 +300,15 @@ class Bolfi(Displayed):
             observed_shape=self.observed.shape,
         )
 
-    def _settled(self, theta: np.ndarray) -> np.ndarray:
-        """Rounds [n] in which theta [n, d] was asked, which is no longer pending; UNKNOWN of what
-        was never asked: simulations made elsewhere are welcome."""
-        rounds = np.full(len(theta), UNKNOWN)
+    def _settled(self, theta: np.ndarray) -> tuple[np.ndarray, tuple[tuple[list[float], int], ...]]:
+        """Rounds [n] in which theta [n, d] was asked, and what is pending without it; UNKNOWN of
+        what was never asked: simulations made elsewhere are welcome."""
+        rounds, pending = np.full(len(theta), UNKNOWN), list(self._pending)
         for row, point in enumerate(theta.tolist()):
-            if point in self._pending:
-                place = self._pending.index(point)
-                del self._pending[place]
-                rounds[row] = self._pending_rounds.pop(place)
-        return rounds
+            places = [place for place, (asked, _) in enumerate(pending) if asked == point]
+            if places:
+                rounds[row] = pending.pop(places[0])[1]
+        return rounds, tuple(pending)
 
     def _check_compared(self, told: History) -> None:
         """Raise ValueError if the user's own function failed on all of the first signals.

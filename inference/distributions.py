@@ -1,4 +1,4 @@
-"""What the engine needs of a numpyro distribution, where numpyro itself lacks it too."""
+"""Distributions of numpyro with all that the engine needs, where numpyro itself lacks it too."""
 
 from collections.abc import Callable
 from typing import Any

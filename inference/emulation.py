@@ -58,9 +58,8 @@ def emulate(prior: Prior, theta: Theta, outputs: ArrayLike, scale: ArrayLike) ->
     require(alike, "outputs", f"have shape ({n}, m), a row per theta", known.shape)
     finite = np.isfinite(known).all(axis=1)
     usable = int(finite.sum())
-    require(
-        usable >= MIN_VALUES, "outputs", f"be finite for {MIN_VALUES} theta", usable, "make more"
-    )
+    due = f"be finite for {MIN_VALUES} theta"
+    require(usable >= MIN_VALUES, "outputs", due, usable, cure="make more")
     check_support(prior, rows)
     positive = weights.shape == known.shape[1:] and (weights > 0.0).all()
     due = f"hold {known.shape[1]} positive numbers, one per output"

@@ -121,8 +121,10 @@ def told_signals(
     """
     due = "an array of numbers" if shape is None else shape
     try:
-        told: list[np.ndarray | str] = list(signals_of(given, n, shape)) if n else []
+        told: list[np.ndarray | str] = list(signals_of(given, n, shape))
     except Unusable as error:
+        if (error.shape or ())[:1] == (n,) == (0,):  # an empty list says nothing of a signal
+            return (), []
         if isinstance(given, np.ndarray) and given.dtype == object and given.ndim == 1:
             given = given.tolist()
         listed = given if isinstance(given, list | tuple) and len(given) == n else []
@@ -164,7 +166,9 @@ def told_seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:
     if seeds is None:
         return np.full(n, UNKNOWN)
     given = np.ma.asarray(seeds, object)
-    require(given.shape == (n,), "seeds", f"have shape ({n},), one per theta", seeds)
+    _check_one_per_theta("seeds", seeds, given, n)
+    if np.ma.is_masked(given):
+        raise ValueError(f"seeds must not be masked, got {seeds!r:.100}; leave those runs out")
     whole = [
         checked_integer(f"seeds[{run}]", seed, -LARGEST_INT64 - 1, LARGEST_INT64)
         for run, seed in enumerate(given)
@@ -186,13 +190,20 @@ def told_errors(
     """
     n = len(succeeded)
     given = np.full(n, None) if errors is None else np.asarray(errors, object)
-    require(given.shape == (n,), "errors", f"have shape ({n},), one per theta", errors)
+    _check_one_per_theta("errors", errors, given, n)
     told = list(map(_failure, given))
     due = "be empty, for the signal of that run is finite"
     for run in np.flatnonzero(succeeded):
         cure = 'tell NaN in its place if the run failed, or the error ""'
-        require(told[run] is None, f"errors[{run}]", due, told[run], cure)
+        require(told[run] is None, f"errors[{run}]", due, told[run], cure=cure)
     return told
+
+
+def _check_one_per_theta(name: str, told: object, given: np.ndarray, n: int) -> None:
+    if given.shape != (n,):
+        raise ValueError(
+            f"{name} must have shape ({n},), one per theta, got {given.shape}: {told!r:.100}"
+        )
 
 
 def _failure(told: object) -> Failure | None:

@@ -162,7 +162,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
     simulator = for_engine(simulate, vectorised, together, time_limit)
     told = _length(checked_prior(prior), earlier)
     due = f"hold {MOST_SIMULATIONS - budget} simulations at most with budget={budget}"
-    require(budget + told <= MOST_SIMULATIONS, "earlier", due, told, "leave the least useful out")
+    require(
+        budget + told <= MOST_SIMULATIONS, "earlier", due, told, cure="leave the least useful out"
+    )
     if initial is None:
         initial = max(MIN_LEARN, min(start_size(len(prior)), budget + told))
     engine = Bolfi(
@@ -182,12 +184,15 @@ def fit(  # noqa: PLR0913  the one call that most users make
     if earlier is not None:
         engine.tell(*earlier)
     due = f"reach the start design of initial={engine.initial} points"
-    require(budget + told >= engine.initial, "budget", due, budget, "raise budget or lower initial")
+    cure = "raise budget or lower initial"
+    require(budget + told >= engine.initial, "budget", due, budget, cure=cure)
     with ExitStack() as stack:
         compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         bar = progress_bar("simulations", budget + confirm, shown=progress, at_least=confirm > 0)
         advance = stack.enter_context(bar)
-        runner = stack.enter_context(Runner(simulator, compute, engine.expected_shape, identity))
+        runner = stack.enter_context(
+            Runner(simulator, compute, shape=engine.expected_shape, identity=identity)
+        )
         schedule = _in_rounds if in_rounds else _in_flight
         finished = schedule(engine, runner, budget, batch)
         seconds = 0.0
@@ -259,23 +264,25 @@ def fit_losses(
     Warns:
         EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
     """
-    one = (noise is None) != (n is None)
-    due = "be one, the sd of the data's noise or the number of data in a loss"
-    require(one, "either noise= or n=", due, (noise, n))
+    if (noise is None) == (n is None):
+        raise ValueError(
+            "give exactly one of noise=, the sd of the data's noise, and n=, the number of data in "
+            f"a loss, got noise={noise!r:.100} and n={n!r:.100}"
+        )
     engine = Bolfi(prior, surrogate="log_likelihood", initial=MIN_LEARN)
     losses, m = checked_array("loss", loss), len(np.atleast_2d(prior.to_array(theta)))
     require(losses.shape == (m,), "loss", f"have shape ({m},), one per theta", losses.shape)
     finite = int(np.isfinite(losses).sum())
-    require(
-        finite >= MIN_LEARN, "loss", f"hold {MIN_LEARN} finite numbers", finite, "simulate more"
-    )
+    due = f"hold {MIN_LEARN} finite numbers"
+    require(finite >= MIN_LEARN, "loss", due, finite, cure="simulate more")
     least = np.nanmin(losses, initial=np.inf)
     due = f"hold sums of squares, {'positive' if noise is None else 'from 0'}"
     cure = (
         "leave such trials out, give noise= for a perfect fit, or give minus a log likelihood, its "
         'sign changed, to fit(surrogate="log_likelihood")'
     )
-    require(least > 0.0 or (least == 0.0 and noise is not None), "loss", due, float(least), cure)
+    fits = least > 0.0 or (least == 0.0 and noise is not None)
+    require(fits, "loss", due, float(least), cure=cure)
     if noise is not None:
         sd = checked_number("noise", noise, lambda sd: 0.0 < sd < np.inf, "positive and finite")
         values = -0.5 * losses / sd**2

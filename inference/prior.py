@@ -95,8 +95,8 @@ class Prior:
             got = tuple(theta.keys()) if is_table(theta) else repr(theta)[:100]
             raise ValueError(f"theta must map the parameters {self.names} to values, got {got}")
         columns = [checked_array(f"theta[{name!r}]", theta[name]) for name in self.names]
-        shapes = [column.shape for column in columns]
-        alike = len(set(shapes)) == 1 and columns[0].ndim <= 1
+        shapes = {name: c.shape for name, c in zip(self.names, columns, strict=True)}
+        alike = len(set(shapes.values())) == 1 and columns[0].ndim <= 1
         require(alike, "theta", "hold scalars or [n] arrays of one length", shapes)
         stacked = np.stack(columns, -1)
         if not np.isfinite(stacked).all():
@@ -110,12 +110,12 @@ class Prior:
         Raises:
             ValueError: of another shape.
         """
-        self._check_columns("array", array)
+        fits = np.shape(array)[-1:] == (len(self),)
+        require(fits, "array", self._columns_due("column"), array)
         return {name: array[..., j] for j, name in enumerate(self.names)}
 
-    def _check_columns(self, name: str, array: np.ndarray) -> None:
-        due = f"have shape [..., {len(self)}], one column for each of the parameters {self.names}"
-        require(np.shape(array)[-1:] == (len(self),), name, due, array)
+    def _columns_due(self, each: str) -> str:
+        return f"have shape [..., {len(self)}], one {each} for each of the parameters {self.names}"
 
     @in_float64
     def to_unit(self, theta: Theta) -> np.ndarray:
@@ -139,7 +139,8 @@ class Prior:
             ValueError: u is of another shape.
         """
         u = checked_array("u", u)
-        self._check_columns("u", u)
+        fits = u.shape[-1:] == (len(self),)
+        require(fits, "u", self._columns_due("quantile"), u.shape)
         return {
             name: _quantile(self._univariate[name], u[..., j]) for j, name in enumerate(self.names)
         }
@@ -250,9 +251,8 @@ def check_key(key: object) -> None:
 def _checked(name: str, distribution: object) -> Univariate:
     named = isinstance(name, str) and name and "/" not in name
     require(named, "a parameter's name", "be text without '/'", name)
-    require(
-        name not in RESERVED, "a parameter's name", "be none that is reserved for results", name
-    )
+    due = "be none that is reserved for results"
+    require(name not in RESERVED, "a parameter's name", due, name, cure="choose another name")
     its = f"prior of {name!r}"
     if not isinstance(distribution, dist.Distribution):
         raise ValueError(
@@ -261,13 +261,13 @@ def _checked(name: str, distribution: object) -> Univariate:
         )
     shape = distribution.batch_shape + distribution.event_shape
     cure = "give one distribution per parameter"
-    require(not shape, its, "be univariate with shape ()", shape, cure)
+    require(not shape, its, "be univariate with shape ()", shape, cure=cure)
     shown = describe(distribution)
-    cure = (
-        "give a Uniform from half below the least number to half above the largest, and round in "
-        "the simulator"
-    )
-    require(not distribution.is_discrete, its, "be continuous", shown, cure)
+    if distribution.is_discrete:
+        raise ValueError(
+            f"{its} must be continuous, got {shown}; give a Uniform from half below the least "
+            "number to half above the largest, and round in the simulator"
+        )
     try:
         with np.errstate(invalid="ignore", divide="ignore"):
             univariate = Univariate(distribution)
@@ -283,11 +283,14 @@ def _checked(name: str, distribution: object) -> Univariate:
             f"{type(distribution).__name__} of which {error}"
         ) from error
     low, high = univariate.bounds
-    cure = "exchange its bounds, or leave a fixed parameter out"
-    require(not low >= high, its, "begin below its end", shown, cure)
-    cure = (
-        f"its cdf(icdf(q)) is {returned} at q = {QUANTILES}: a bound may lie too far out in a tail"
-    )
-    due = "be continuous, with finite arguments"
-    require(np.allclose(returned, QUANTILES), its, due, shown, cure)
+    if low >= high:
+        raise ValueError(
+            f"{its} must begin below its end, got {shown}; exchange its bounds, or leave a fixed "
+            "parameter out"
+        )
+    if not np.allclose(returned, QUANTILES):
+        raise ValueError(
+            f"{its} must be continuous, with finite arguments, got {shown}, whose cdf(icdf(q)) is "
+            f"{returned} at q = {QUANTILES}; a bound may lie too far out in a tail"
+        )
     return univariate

@@ -119,7 +119,7 @@ class Fit(Displayed):
 
     @property
     def recipe(self) -> Recipe:
-        """How it was made.
+        """The simulator, and how `fit` made this of it.
 
         Raises:
             ValueError: that is not known, see `made_by`.
@@ -155,7 +155,7 @@ class Fit(Displayed):
         return said
 
     def _discrepancies(self) -> str:
-        """Of the closest run, and of those at draws of the posterior."""
+        """Discrepancies of the closest run, and of those at draws of the posterior."""
         said = f"{self.closest.discrepancy:.4g} of the closest run"
         worth = ["failed" if np.isnan(one) else f"{one:.4g}" for one in self._drawn]
         return (

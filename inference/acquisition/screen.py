@@ -46,7 +46,7 @@ class _Kernel(NamedTuple):
         return np.where(choice[:, None] < PRIOR_SHARE, z, centre + z @ self.factor.T)
 
     def log_density(self, x: np.ndarray) -> np.ndarray:
-        """Of a round's proposals at x [n, d]."""
+        """Log density of a round's proposals at x [n, d]."""
         apart = (x[:, None, :] - self.centres).reshape(-1, x.shape[1])
         white = solve_triangular(self.factor, apart.T, lower=True).T
         each = log_prior(white).reshape(len(x), -1) - np.log(np.diag(self.factor)).sum()
@@ -86,7 +86,7 @@ def _finite(values: np.ndarray) -> np.ndarray:
 def _log_weights(
     x: np.ndarray, values: np.ndarray, mass: np.ndarray, power: np.ndarray
 ) -> np.ndarray:
-    """Of targets raised to powers [m]: [m, n]."""
+    """Log weights [m, n] for targets raised to powers [m]."""
     return power[:, None] * values + log_prior(x) - mass
 
 

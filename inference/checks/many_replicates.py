@@ -5,6 +5,7 @@ import json
 from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Executor, as_completed
 from contextlib import ExitStack, closing
+from os.path import commonprefix
 from pathlib import Path
 from typing import Any
 
@@ -208,7 +209,7 @@ class ReplicateStore:
             execute("COMMIT")
             both = {name: (stored.get(name), settings.get(name)) for name in {*stored, *settings}}
             unlike = [
-                f"{name}: stored {_start(one)}, now {_start(other)}"
+                "{}: stored {}, now {}".format(name, *_where_unlike(one, other))
                 for name, (one, other) in sorted(both.items())
                 if stored and one != other
             ]
@@ -258,7 +259,13 @@ def _from_row(row: tuple) -> Replicate:
     return Replicate(number, **how, **held)
 
 
-def _start(value: str | None) -> str:
-    """A setting as a message shows it: representations of pipelines fill pages."""
-    text = json.dumps(value)
-    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
+def _where_unlike(one: str | None, other: str | None) -> list[str]:
+    """Two settings as a message shows them, cut around the first letter in which they differ:
+    representations of pipelines fill pages."""
+    texts = [json.dumps(one), json.dumps(other)]
+    first = max(len(commonprefix(texts)) - MOST_SHOWN // 2, 0)
+    last = first + MOST_SHOWN
+    return [
+        f"{'...' if first else ''}{text[first:last]}{'...' if text[last:] else ''}"
+        for text in texts
+    ]

@@ -17,11 +17,11 @@ from ..result import Fit, Recipe
 from ..types import Simulator
 from .many_replicates import replicates
 from .one_replicate import LogDensity, Observe
-from .posterior_checks import SBC, Coverage, Tarp, coverage, sbc, tarp
+from .posterior_checks import SBC, Coverage, Tarp, Warned, coverage, sbc, tarp
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class FitCheck:
+class FitCheck(Warned):
     """Three checks of the same replicates.
 
     Attributes:
@@ -39,11 +39,6 @@ class FitCheck:
         """Warnings about the pipeline, each once."""
         parts = (self.sbc, self.coverage, self.tarp)
         return list(dict.fromkeys(warning for part in parts for warning in part.warnings))
-
-    @property
-    def ok(self) -> bool:
-        """No warning."""
-        return not self.warnings
 
     def __repr__(self) -> str:
         return "\n\n".join(map(str, (self.sbc, self.coverage, self.tarp)))

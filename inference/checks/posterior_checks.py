@@ -23,9 +23,23 @@ BOOTSTRAPS = 1000
 BOOTSTRAP_CONFIDENCE = 0.95  # of the bootstrap band
 
 
+class Warned(ABC):
+    """A result that is `ok` unless it warns."""
+
+    @property
+    @abstractmethod
+    def warnings(self) -> list[str]:
+        """Warnings about the pipeline."""
+
+    @property
+    def ok(self) -> bool:
+        """No warning."""
+        return not self.warnings
+
+
 @dataclass(frozen=True, eq=False)
-class Judged(ABC):
-    """The result of a check; it is `ok` unless it warns.
+class Judged(Warned):
+    """The result of a check.
 
     Attributes:
         replicates: What was checked, R of them.
@@ -44,11 +58,6 @@ class Judged(ABC):
     def warnings(self) -> list[str]:
         """Warnings about the pipeline."""
         return self.replicates.warnings + self.faults
-
-    @property
-    def ok(self) -> bool:
-        """No warning."""
-        return not self.warnings
 
     def _table(self, heading: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
         """A heading, aligned columns (the first to the left), and what was found wrong."""
@@ -373,7 +382,7 @@ class Tarp(Judged):
 
     @property
     def faults(self) -> list[str]:
-        """That the joint posterior does not cover."""
+        """The sentence that the joint posterior does not cover, where it does not."""
         p = min(self.ecdf, self.kolmogorov_smirnov)
         if p >= self.alpha / 2:
             return []

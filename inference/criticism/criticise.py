@@ -249,14 +249,13 @@ def _explanations(
     passed = [one.names for one in members]
     accepted = _among(candidates, accept)
     chosen = [one for one in candidates if one.names in passed or one is accepted]
-    gaps = _gaps(study, base, chosen, held_out)
+    gaps, failed = _gaps(study, base, chosen, held_out)
     # what cannot be simulated there is not borne out there
-    failed = [one.names for one in chosen if held_out and one.names not in gaps]
     judged = [
-        replace(one, gaps=gaps.get(one.names, ()), predicted=one.names not in failed)
+        replace(one, gaps=gaps.get(one.names, ()), unpredicted=failed.get(one.names, ""))
         for one in candidates
     ]
-    return judged, [one for one in judged if one.names in passed and one.predicted]
+    return judged, [one for one in judged if one.names in passed and not one.unpredicted]
 
 
 def _rivals(
@@ -275,8 +274,8 @@ def _left_out(candidates: Sequence[Candidate]) -> dict[str, str]:
     could not be simulated for held-out data: name -> why."""
     found: dict[str, str] = {}
     for one in candidates:
-        if not one.predicted:
-            found |= dict.fromkeys(one.names, "no simulation for the held-out data succeeded")
+        if one.unpredicted:
+            found |= dict.fromkeys(one.names, one.unpredicted)
         elif len(one.names) == 1 and one.passes and not one.refitted:
             found |= dict.fromkeys(one.names, "it was not refitted")
     return found
@@ -289,28 +288,33 @@ def _among(candidates: Sequence[Candidate], names: Sequence[str] | None) -> Cand
 
 def _gaps(
     study: Study, base: Base, chosen: Sequence[Candidate], held_out: Sequence[Experiment]
-) -> dict[tuple[str, ...], tuple[Gap, ...]]:
-    """Names -> gaps, of those that can be simulated for the held-out data."""
+) -> tuple[dict[tuple[str, ...], tuple[Gap, ...]], dict[tuple[str, ...], str]]:
+    """Names -> gaps, of those that can be simulated for the held-out data; and names -> why, of
+    the others."""
     count, seed = study.plan.held_out, study.seed
     if not chosen or not held_out:
-        return {}
+        return {}, {}
     models = [base.hypothesis, *(candidate.hypothesis for candidate in chosen)]
     drawn = [weighted_posterior(model, seed).draw(seed, count) for model in models]
     gaps: dict[tuple[str, ...], tuple[Gap, ...]] = {model.names: () for model in models[1:]}
+    failed: dict[tuple[str, ...], str] = {}
     for one in held_out:
         before, *after = study.run_each(f"held out {one.label}", drawn, one)
         if not len(before):
             raise AllRunsFailed(before.error)
         there = np.isfinite(one.observed)
+        for model, made in zip(models[1:], after, strict=True):
+            if not len(made):
+                failed.setdefault(model.names, made.error)
         gaps = {
             model.names: (
                 *gaps[model.names],
                 gap(one, before.signals[:, there], made.signals[:, there], seed),
             )
             for model, made in zip(models[1:], after, strict=True)
-            if len(made) and model.names in gaps
+            if model.names not in failed
         }
-    return gaps
+    return gaps, failed
 
 
 def _check_others(name: str, given: Any, kind: type) -> None:

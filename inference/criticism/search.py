@@ -160,7 +160,7 @@ def own_residual(
 
     Args:
         compute: Where runs are made and kept.
-        report: Called with the phase and the number of simulations finished in it.
+        report: As in `criticise`.
         start: Runs all over the prior, before those where the model fits best.
 
     Raises:

@@ -26,7 +26,7 @@ class Candidate:
             accepted.
         needed: Whether, of several effects, each is needed.
         gaps: On the held-out data, where it was compared with them.
-        predicted: Whether it could be simulated for the held-out data.
+        unpredicted: Why it could not be simulated for held-out data; "" where it could.
     """
 
     hypothesis: Hypothesis
@@ -35,7 +35,7 @@ class Candidate:
     refitted: bool = False
     needed: bool = True
     gaps: tuple[Gap, ...] = ()
-    predicted: bool = True
+    unpredicted: str = ""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -44,7 +44,7 @@ class Candidate:
     @property
     def held(self) -> bool:
         """Whether it held on the held-out data, where there were any."""
-        return self.predicted and holds(self.gaps)
+        return not self.unpredicted and holds(self.gaps)
 
     @property
     def evidence(self) -> float:

@@ -66,7 +66,8 @@ def log_marginal_likelihood(hyper: Hyper, data: Data) -> tuple[np.ndarray, np.nd
 def _together(
     hyper: Hyper, data: Data, at: np.ndarray, squared: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of a few processes at coordinates [n, d], whose squared differences are [n n, d]."""
+    """Log marginal likelihoods and gradients of a few processes at coordinates [n, d], whose
+    squared differences are [n n, d]."""
     (n, d), k, diagonal = at.shape, len(data.y), np.arange(len(at))
     basis = trend(hyper, at)
     noise, rate = data.noise(hyper.log_noise), np.exp(-2.0 * hyper.log_length)
@@ -100,7 +101,8 @@ def _together(
 
 
 def negative_log_posterior(vectors: np.ndarray, data: Data) -> tuple[np.ndarray, np.ndarray]:
-    """Of vectors [k, d + 2], up to a constant [k], and the gradients [k, d + 2]."""
+    """Minus the log posterior densities [k] of vectors [k, d + 2], up to a constant, and the
+    gradients [k, d + 2]."""
     mean, sd = prior_moments(data.u.shape[1])
     z = (vectors - mean) / sd
     values, gradients = log_marginal_likelihood(unpack(vectors), data)

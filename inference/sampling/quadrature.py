@@ -27,7 +27,6 @@ class Quadrature(NamedTuple):
     mass: np.ndarray  # [n], sums to one
     log_evidence: float  # log of the likelihood's prior mean
     log_likelihood: np.ndarray  # [n], at the centres
-    evaluations: int
 
 
 class _Cells(NamedTuple):
@@ -73,7 +72,7 @@ def integrate(target: Target, budget: int = QUICK_BUDGET) -> Quadrature:
     top = log_mass.max()
     mass = np.exp(log_mass - top)
     evidence = float(top + np.log(mass.sum()))
-    return Quadrature(cells.low, cells.width, mass / mass.sum(), evidence, cells.value, spent)
+    return Quadrature(cells.low, cells.width, mass / mass.sum(), evidence, cells.value)
 
 
 def _first(target: Target) -> _Cells:

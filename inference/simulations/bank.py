@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import LARGEST_INT64, check_kind, check_text, checked_integer, require
+from ..arguments import LARGEST_INT64, check_kind, check_text, checked_integer
 from ..notebook_display import Displayed
 from .database import disk_errors, opened_database
 from .failures import Failure, failure_columns, failure_of
@@ -110,22 +110,19 @@ class SimulationBank(Displayed):
             return self._connection.execute(statement, values).fetchall()
 
     def _rows(self, where: str, *values: object) -> list[tuple[Any, ...]]:
-        """Rows as `_digest` takes them, by theta and seed; damaged ones are logged and removed, for
-        else they could not be put again."""
-        found = self._execute(
+        """Rows as `_digest` takes them, and behind each its digest; by theta and seed."""
+        return self._execute(
             "SELECT identity, theta, seed, signal, dtype, shape, failure, error, seconds, digest "
             f"FROM simulation WHERE {where} ORDER BY theta, seed",
             *values,
         )
-        whole = []
-        for *row, digest in found:
-            if _digest(row) == digest:
-                whole.append(tuple(row))
-                continue
-            damaged = "%s: a damaged row counts as not simulated: %s"
-            logger.warning(damaged, self.path, row[1:3])
-            self._execute("DELETE FROM simulation WHERE digest = ?", digest)
-        return whole
+
+    def _is_whole(self, row: Sequence[Any], digest: bytes) -> bool:
+        """Whether a row, see `_digest`, is as it was stored; one that is not is logged."""
+        if _digest(row) == digest:
+            return True
+        logger.warning("%s: a damaged row counts as not simulated: %s", self.path, row[1:3])
+        return False
 
     def get(self, identity: str, theta: Mapping[str, float], seed: int) -> Simulation | None:
         """The run of exactly this simulator, theta and seed, or None."""
@@ -133,7 +130,12 @@ class SimulationBank(Displayed):
         rows = self._rows("identity = ? AND theta = ? AND seed = ?", *key)
         if not rows:
             return None
-        _, _, _, blob, dtype, shape, kind, text, seconds = rows[0]
+        *row, digest = rows[0]
+        if not self._is_whole(row, digest):
+            with disk_errors(self.path):  # else it could not be put again
+                self._execute("DELETE FROM simulation WHERE digest = ?", digest)
+            return None
+        blob, dtype, shape, kind, text, seconds = row[3:]
         signal = None if blob is None else _signal(blob, dtype, shape)
         return Simulation(signal, failure_of(kind, text), seconds)
 
@@ -183,12 +185,16 @@ class SimulationBank(Displayed):
             ValueError: there are none, or their signals or parameters are not alike.
         """
         check_text("identity", identity)
-        rows = self._rows("identity = ? AND signal IS NOT NULL", identity)
+        found = self._rows("identity = ? AND signal IS NOT NULL", identity)
+        rows = [row for *row, digest in found if self._is_whole(row, digest)]
         theta = [json.loads(row[1]) for row in rows]
         kinds = {(tuple(names), row[5]) for names, row in zip(theta, rows, strict=True)}
-        found = [f"{', '.join(names)} -> {shape}" for names, shape in sorted(kinds)]
-        due = f"hold simulations of one kind for identity={identity!r}"
-        require(len(kinds) == 1, self.path, due, found or None)
+        shown = [f"{', '.join(names)} -> {shape}" for names, shape in sorted(kinds)]
+        if len(kinds) != 1:
+            raise ValueError(
+                f"{self.path} must hold simulations of one kind for identity={identity!r}, got "
+                f"{shown or 'none'}"
+            )
         return Simulations(
             {name: np.array([row[name] for row in theta]) for name in theta[0]},
             np.stack([_signal(*row[3:6]) for row in rows]),
@@ -237,7 +243,7 @@ def _key(identity: str, theta: Mapping[str, float], seed: int) -> tuple[str, str
 
 
 def _digest(row: Sequence[Any]) -> bytes:
-    """Of identity, theta, seed, signal, dtype, shape, kind of failure, error and seconds."""
+    """SHA-256 of identity, theta, seed, signal, dtype, shape, failure, error and seconds."""
     signal = row[3] or b""
     return sha256(repr((*row[:3], *row[4:])).encode() + signal).digest()
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from os import PathLike
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -83,6 +84,8 @@ def open_compute(
         ImportError, ConnectionError: Dask is not installed, or no scheduler answers.
     """
     checked = Compute(None, timeout, batch)
+    usable = bank is None or isinstance(bank, PathLike | SimulationBank | str) and bank != ""
+    require(usable, "bank", "be the path of a file or a SimulationBank", bank)
     with ExitStack() as stack:
         if bank is not None and not isinstance(bank, SimulationBank):
             bank = stack.enter_context(SimulationBank(bank))
@@ -119,10 +122,10 @@ def open_executor(
                 f"Dask scheduler or None, got {given!r:.100} of type {type(given).__name__}"
             )
         # there is no public way to ask, and the default on Linux, up to Python 3.13, hangs at times
-        context = getattr(given, "_mp_context", None)
+        context = given._mp_context if isinstance(given, ProcessPoolExecutor) else None
         forks = context is not None and context.get_start_method() == "fork"
         due = "start no workers by fork, which JAX's threads do not survive"
-        require(not forks, "executor", due, given, SPAWNING)
+        require(not forks, "executor", due, given, cure=SPAWNING)
         if one_thread:
             _check_one_thread(given)
         yield given
@@ -130,7 +133,8 @@ def open_executor(
 
 def _check_one_thread(executor: Executor | None) -> None:
     due = "be no threads, for the simulator serves only one of a process"
-    require(not isinstance(executor, ThreadPoolExecutor), "executor", due, executor, SPAWNING)
+    threaded = isinstance(executor, ThreadPoolExecutor)
+    require(not threaded, "executor", due, executor, cure=SPAWNING)
     client = getattr(executor, "_client", None)  # of Dask's executor; there is no public way
     for worker, threads in client.nthreads().items() if isinstance(client, DaskClient) else ():
         if threads > 1:

@@ -51,7 +51,7 @@ def opened_database(path: object, schema: str, what: str) -> sqlite3.Connection:
         OSError: the disk is full or fails.
     """
     named = isinstance(path, str | os.PathLike) and str(path)
-    require(named, what, "have the path of a file", path)
+    require(named, f"the path of a {what}", "name a file", path)
     # threads may share it, if they take turns
     options = {"timeout": BUSY_MS / 1000, "isolation_level": None, "check_same_thread": False}
     try:

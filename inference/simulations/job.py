@@ -42,7 +42,15 @@ class Job(NamedTuple):
 
 
 class Overdue(Exception):
-    """A call that was given up; not a TimeoutError, for a simulator may raise one itself."""
+    """A call that was given up; not a TimeoutError, for a simulator may raise one itself.
+
+    Args:
+        seconds: Which it was allowed.
+    """
+
+    def __init__(self, seconds: float):
+        super().__init__(seconds)
+        self.seconds = seconds
 
 
 def simulation_seed(seed: int, index: int) -> int:
@@ -244,8 +252,8 @@ def _one_call(
         signals = within(
             allowed, lambda: signals_of(simulate(*arguments), len(batch), shape), limit
         )
-    except Overdue:
-        failure, seconds = timed_out(timeout or 0.0), timeout or 0.0
+    except Overdue as overdue:
+        failure, seconds = timed_out(overdue.seconds), overdue.seconds
     # whatever the user's code raises is a failed run, and kept; many programs end by SystemExit
     except (Exception, SystemExit) as error:
         bad = isinstance(error, Unusable)
@@ -264,7 +272,7 @@ def _one_call(
 
 
 def signals_of(returned: object, n: int, shape: tuple[int, ...] | None) -> np.ndarray:
-    """What a simulator returned for n runs: float64 [n, *shape].
+    """Signals that a simulator returned for n runs, float64 [n, *shape].
 
     Args:
         shape: Of one signal; None accepts any.
@@ -287,7 +295,7 @@ def misshapen(
         # `OneByOne` puts an axis for the one run before the signal's
         got = error.got if error.shape is None else error.shape[1:]
         due = "one signal" if shape is None else f"one signal of shape {shape}"
-        return unusable(f"simulate must return {due}, got {got}{of_which} by vectorised=False")
+        return unusable(f"with vectorised=False simulate must return {due}, got {got}{of_which}")
     due = f"({len(batch)}, ...)" if shape is None else (len(batch), *shape)
     single = error.shape is not None and error.shape == shape
     cure = "; if it makes one run at a time, pass vectorised=False" if single else ""
@@ -298,7 +306,7 @@ def misshapen(
 
 
 def within[R](timeout: float | None, call: Callable[[], R], limit: Limit | None = None) -> R:
-    """What `call` returns or raises, if it does so in `timeout` seconds.
+    """Return or raise as `call` does, if it does so in `timeout` seconds.
 
     With a `limit` the call stops itself, in this thread. Else it runs in a thread of its own.
     Python cannot stop a thread: one that is overdue is abandoned, and goes on, unheard, until it
@@ -318,7 +326,7 @@ def within[R](timeout: float | None, call: Callable[[], R], limit: Limit | None 
         except TimeoutError as error:
             if time.monotonic() < ends:
                 raise
-            raise Overdue from error
+            raise Overdue(timeout) from error
     outcome: Future[R] = Future()
 
     def run() -> None:
@@ -332,5 +340,5 @@ def within[R](timeout: float | None, call: Callable[[], R], limit: Limit | None 
     thread.start()
     thread.join(min(timeout, threading.TIMEOUT_MAX))
     if not outcome.done():
-        raise Overdue
+        raise Overdue(timeout)
     return outcome.result()

@@ -46,6 +46,7 @@ class Runner:
         self,
         simulate: Simulator,
         compute: Compute,
+        *,
         shape: tuple[int, ...] | None = None,
         identity: str = "",
     ):
@@ -211,7 +212,7 @@ class Runner:
             self.bank.release(self.identity, *job)
 
     def _explained(self, error: BaseException, submitting: bool = False) -> BaseException:
-        """What to tell the user of an executor's own error."""
+        """An executor's own error in the user's terms."""
         if isinstance(error, BrokenExecutor | CancelledError):
             jobs = "; ".join(f"{job.theta}, seed {job.seed}" for job in list(self._mine.values()))
             told = RuntimeError(
@@ -272,7 +273,7 @@ def run_missing(
     """
     at_once = None if compute.executor is not None else compute.batch
     results = []
-    with Runner(simulate, compute, shape, identity) as runner:
+    with Runner(simulate, compute, shape=shape, identity=identity) as runner:
         for part in batched(jobs, at_once or max(len(jobs), 1)):
             for outcome in runner.start(part):
                 results.append(runner.result(outcome))

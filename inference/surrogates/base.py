@@ -115,8 +115,8 @@ class Surrogate(Protocol):
         return []
 
     def checks(self) -> dict[str, np.ndarray]:
-        """Of the emulator: `loo_z`, studentised leave-one-out errors [n, ...], a row for each
-        simulation that was learned from."""
+        """Checks of the emulator: `loo_z`, studentised leave-one-out errors [n, ...], a row for
+        each simulation that was learned from."""
         return {}
 
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:

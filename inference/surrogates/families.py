@@ -30,7 +30,11 @@ def resolve(surrogate: str | Family | None, options: dict[str, Any]) -> Family:
             name a discrepancy and an option of "signal".
     """
     if Family in type(surrogate).__mro__:
-        _check_options(f"{surrogate!r:.100}, which takes its own,", options, set())
+        if options:
+            raise ValueError(
+                f"an object takes its own options: give {', '.join(options)} to "
+                f"{type(surrogate).__name__}(...) itself"
+            )
         family = cast(Family, surrogate)
         check_called("learn of surrogate", family.learn, "data", "key")
         return family
@@ -51,17 +55,13 @@ def resolve(surrogate: str | Family | None, options: dict[str, Any]) -> Family:
             f"surrogate must be one of {tuple(FAMILIES)}, an object of a class whose base is "
             f"`Family`, or None, got {surrogate!r:.100}"
         )
-    _check_options(repr(surrogate), options, _options(surrogate))
-    return FAMILIES[str(surrogate)](**options)
-
-
-def _check_options(surrogate: str, options: dict[str, Any], known: set[str]) -> None:
-    unknown = options.keys() - known
+    unknown = options.keys() - _options(surrogate)
     if unknown:
         raise ValueError(
-            f"there is no argument {', '.join(sorted(unknown))}; the surrogate {surrogate} has "
-            f"the options {tuple(sorted(known))}"
+            f"there is no argument {', '.join(sorted(unknown))}; the surrogate {surrogate!r} has "
+            f"the options {tuple(sorted(_options(surrogate)))}"
         )
+    return FAMILIES[str(surrogate)](**options)
 
 
 def _options(name: Any) -> set[str]:
@@ -85,7 +85,9 @@ def checked_surrogate(found: Any, family: Family) -> Surrogate:
 
 
 def _has(found: object, name: str) -> bool:
-    """Whether an object has a member that has a body; no property is evaluated."""
-    member = getattr(type(found), name, None)
-    stub = name in BODILESS and member is getattr(Surrogate, name, None)
-    return name in getattr(found, "__dict__", {}) or not (member is None or stub)
+    """Whether an object has a member that has a body; no property of a class that is derived from
+    `Surrogate` is evaluated."""
+    if Surrogate not in type(found).__mro__:
+        return hasattr(found, name)  # it may delegate to another object
+    stub = name in BODILESS and getattr(type(found), name, None) is getattr(Surrogate, name, None)
+    return name in getattr(found, "__dict__", {}) or not stub

@@ -227,13 +227,9 @@ class SignalSurrogate(OfProcesses):
             return False
         weights, (sigma, rho) = self.node_weights, self.nodes
         slow = float(weights @ (sigma**2 * (rho > SLOW)))
-        most = 0.5 * max(self._residual**2, float(weights @ sigma**2))
+        residual = _residual(self.emulator, self.observed)
+        most = 0.5 * max(residual**2, float(weights @ sigma**2))
         return slow > max(most, LEAST_SEEN**2)
-
-    @property
-    def _residual(self) -> float:
-        """Root mean square of what no component can make of the data, standardised."""
-        return _residual(self.emulator, self.observed)
 
     def _outside(self) -> bool:
         """Whether the observed scores are twice as far out as any simulated ones, or what no
@@ -243,7 +239,8 @@ class SignalSurrogate(OfProcesses):
         far = np.abs(self.reduced.estimate) > 2.0 * reach + 3.0 * error
         varied = np.sum(self.emulator.basis.vectors**2) + self.emulator.remainder.total
         differ = np.sqrt(varied / len(self.observed))  # what simulations differ by
-        far_off = self.output.long and self._residual > max(1.0, differ)
+        residual = _residual(self.emulator, self.observed)
+        far_off = self.output.long and residual > max(1.0, differ)
         if far.any(1).all() or not far_off:
             return bool(far.any(1).all())
         # noise as it is given, or one that varies fast, may explain the residual

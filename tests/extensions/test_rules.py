@@ -1,4 +1,5 @@
-"""What every acquisition rule must do, of the engine's, the example's, and one of your own.
+"""What every acquisition rule must do, of the example's, and one of your own; and of the engine's,
+of which `test_surrogates.py` asks the rest with each surrogate.
 
 `pytest tests/extensions --rule your_module:YourRule` adds the last to each test.
 """
@@ -23,8 +24,9 @@ TRUTH = 0.4
 
 def pytest_generate_tests(metafunc):
     own = metafunc.config.getoption("rule", default="")
-    names = [*RULES, "example", *([own] if own else [])]
-    metafunc.parametrize("rule", names, indirect=True)
+    names = ["example", *([own] if own else [])]
+    engines = [] if "learned" in metafunc.fixturenames else [*RULES]
+    metafunc.parametrize("rule", [*engines, *names], indirect=True)
 
 
 @pytest.fixture

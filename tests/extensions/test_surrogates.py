@@ -11,7 +11,7 @@ from bolfi_liquids.inference.acquisition.rules import RULES
 from bolfi_liquids.inference.sampling.nuts import padded
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates import Family, Surrogate
-from bolfi_liquids.inference.surrogates.families import FAMILIES
+from bolfi_liquids.inference.surrogates.families import FAMILIES, checked_surrogate
 from bolfi_liquids.inference.surrogates.processes import OfProcesses
 
 from bolfi_liquids import inference
@@ -212,7 +212,7 @@ def test_a_surrogate_that_ignores_pending_points_is_noticed():
 def test_every_rule_chooses_by_it(family, learned, subtests):
     """Different points, the same for a key; "lcb" where the surrogate has a lower bound."""
     assert family.has_lower_bound == hasattr(learned, "lower_bound")
-    before = jax.tree.leaves(learned.log_likelihood)
+    before = [np.array(leaf) for leaf in jax.tree.leaves(learned.log_likelihood)]
     for name, rule in RULES.items():
         with subtests.test(name):
             if name == "lcb" and not family.has_lower_bound:
@@ -238,6 +238,26 @@ def test_what_is_no_family_is_refused_before_it_learns():
     for given in (WithoutBase(), WithoutKey, WithoutKey()):
         with pytest.raises(ValueError, match="surrogate"):
             inference.Bolfi(PRIOR, OBSERVED, surrogate=given)
+
+
+def test_the_options_of_a_family_belong_to_the_object_itself():
+    for given in (QuadraticSurface(), inference.SignalFamily()):
+        with pytest.raises(
+            ValueError, match=rf"give noise to {type(given).__name__}\(\.\.\.\) itself"
+        ):
+            inference.Bolfi(PRIOR, OBSERVED, surrogate=given, noise=0.1)
+
+
+def test_a_surrogate_may_delegate_to_another():
+    class Delegating:
+        def __init__(self, inner):
+            self.inner = inner
+
+        def __getattr__(self, name):
+            return getattr(self.inner, name)
+
+    found = Delegating(fitted(QuadraticSurface()).learned)
+    assert checked_surrogate(found, QuadraticSurface()) is found
 
 
 def test_what_is_no_surrogate_is_refused_with_what_is_missing():

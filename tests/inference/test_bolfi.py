@@ -1,5 +1,6 @@
 """Ask and tell: what is asked, what is learned of, and what neither may disturb."""
 
+import copy
 import pickle
 
 import jax
@@ -184,6 +185,40 @@ def test_telling_nothing_changes_nothing(prior, observed):
     engine.tell({"slope": [], "offset": []}, [], [], [])
     engine.tell({"slope": [], "offset": []}, np.zeros((0, 30)))
     assert engine.told == 0 and engine.history.failures == {}
+
+
+@pytest.mark.parametrize(
+    ("signals", "got"),
+    [(np.ones((50, 3)), r"\(50, 3\)"), ("nonsense", "nonsense"), ([[1.0], [1.0, 2.0]], "1.0")],
+)
+def test_signals_of_no_theta_are_refused(prior, signals, got):
+    engine = inference.Bolfi(prior, np.zeros(3))
+    nothing = {name: [] for name in prior.names}
+    with pytest.raises(ValueError, match=rf"^signals must be .* \(0, 3\), .*{got}"):
+        engine.tell(nothing, signals)
+    assert not engine.told
+
+
+def test_a_copy_and_its_original_go_on_apart(prior, observed, simulate):
+    engine = inference.Bolfi(prior, observed)
+    theta = engine.ask(4)
+    other = copy.copy(engine)
+    engine.tell(theta, simulate(theta, range(4)))
+    engine.ask(2)
+    assert (other.told, len(other._pending), len(engine._pending)) == (0, 4, 2)
+    other.tell(theta, simulate(theta, range(4)))
+    np.testing.assert_array_equal(other.history.rounds, np.zeros(4))
+
+
+def test_what_could_not_be_told_is_still_pending(prior, observed, simulate, monkeypatch):
+    engine = inference.Bolfi(prior, observed)
+    theta = engine.ask(2)
+    with monkeypatch.context() as broken:
+        broken.setattr(type(engine.history), "and_then", lambda *_: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            engine.tell(theta, simulate(theta, range(2)))
+    engine.tell(theta, simulate(theta, range(2)))
+    np.testing.assert_array_equal(engine.history.rounds, [0, 0])
 
 
 def test_a_fit_needs_three_successes(prior, observed, simulate):

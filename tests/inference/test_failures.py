@@ -71,7 +71,9 @@ def test_copies_among_earlier_simulations_are_too_few(prior, observed):
 
 
 def test_a_single_run_s_signal_of_wrong_shape_is_told_as_the_user_made_it(prior, observed):
-    with pytest.raises(ValueError, match=re.escape("(30,), got (1, 30)")):
+    with pytest.raises(
+        ValueError, match="^with vectorised=False simulate .* " + re.escape("(30,), got (1, 30)")
+    ):
         inference.fit(lambda theta, seed: np.zeros((1, 30)), prior, observed, vectorised=False)
 
 

@@ -213,7 +213,7 @@ VALUES = {
         *({"units": given} for given in ({"b": "m"}, {"a": 1.0}, ["m"], "m")),
     ],
     "Prior of one": [
-        ("a", {"distributions": {"a": one}})
+        ("thickness", {"distributions": {"thickness": one}})
         for one in (
             *(dist.Uniform(1.0, 0.0), dist.Uniform(1.0, 1.0), dist.LogUniform(2.0, 1.0)),
             *(dist.Uniform(0.0, np.inf), dist.Uniform(np.nan, 1.0), dist.Normal(0.0, np.inf)),
@@ -336,10 +336,45 @@ def test_a_value_out_of_range_is_refused_by_its_argument(cases, name):
     assert not wrong
 
 
+@pytest.mark.parametrize(
+    ("name", "given", "told"),
+    [
+        ("Prior", {"distributions": {"seed": dist.Uniform(0.0, 1.0)}}, "choose another name"),
+        ("Prior", {"distributions": {"a": dist.Uniform(1.0, 0.0)}}, r"got Uniform\(.*; exchange"),
+        ("Prior.to_array", {"theta": {"a": np.zeros((2, 2))}}, r"got \{'a': \(2, 2\)\}"),
+        ("Prior.from_unit", {"u": np.zeros((4, 2))}, r"quantile .* got \(4, 2\)"),
+        ("Bolfi.tell", {"seeds": [1]}, r"got \(1,\): \[1\]"),
+        ("Bolfi.tell", {"seeds": np.ma.masked_equal(SEEDS, 3)}, "leave those runs out"),
+        ("fit", {"noise": "loud"}, 'number, an array, a function of the mean or "poisson"'),
+        ("fit_losses", {"n": 3}, r"^give exactly one of noise=.* n=3$"),
+    ],
+)
+def test_a_refusal_says_what_came_and_what_to_do(cases, name, given, told):
+    call, good = cases[name]
+    with pytest.raises(ValueError, match=told):
+        call(**good | given)
+
+
+def test_a_bank_is_refused_with_what_it_may_be(cases):
+    call, good = cases["fit"]
+    due = r"^bank must be the path of a file or a SimulationBank, got "
+    for wrong in (3, "", b"runs.sqlite"):
+        with pytest.raises(ValueError, match=due):
+            call(**good, bank=wrong)
+
+
 def test_a_pool_that_forks_is_refused(cases):
     call, good = cases["fit"]
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("fork")) as pool:
         assert refusal(call, good | {"executor": pool}, "executor") == ""
+
+
+def test_an_executor_that_is_no_pool_of_processes_may_hold_what_it_likes():
+    class Other(ThreadPoolExecutor):
+        _mp_context = multiprocessing.get_context("fork")
+
+    with Other(1) as pool, open_compute(executor=pool) as compute:
+        assert compute.executor is pool
 
 
 def test_a_simulator_of_one_thread_takes_no_pool_of_threads():

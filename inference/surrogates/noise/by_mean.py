@@ -8,7 +8,7 @@ from typing import ClassVar, cast
 import numpy as np
 from scipy.special import xlogy
 
-from ...arguments import check_choice, checked_array, checked_number
+from ...arguments import checked_array, checked_number
 from ..output_vectors import Output
 from .given import GivenNoise
 
@@ -115,7 +115,11 @@ def law_of(noise: object) -> Law | None:
         ValueError: text other than "poisson".
     """
     if isinstance(noise, str):
-        check_choice("noise, where it is text,", noise, ("poisson",))
+        if noise != "poisson":
+            raise ValueError(
+                'noise must be a number, an array, a function of the mean or "poisson", got '
+                f"{noise!r:.100}"
+            )
         return Poisson()
     return Gaussian(cast(SdOfMean, noise)) if callable(noise) else None
 

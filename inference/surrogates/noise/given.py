@@ -84,11 +84,15 @@ def given_sds(noise: ArrayLike, output: Output) -> np.ndarray | None:
         sds = given.ravel()[np.sort(output.present)]
     elif given.shape == (samples,):
         sds = given
+    elif given.shape == square:
+        raise ValueError(
+            f"noise of shape {given.shape} may be sds or a covariance; give sds as [{samples}]"
+        )
     else:
         raise ValueError(
             f"noise must be a number, sds of shape {output.shape} as observed or [{samples}], or a "
-            f"[{samples}, {samples}] covariance, of the finite observed values, and not two of "
-            f"these, got shape {given.shape}"
+            f"[{samples}, {samples}] covariance, of the finite observed values, "
+            f"got shape {given.shape}"
         )
     wrong = sds[~(np.isfinite(sds) & (sds >= 0.0))]
     if wrong.size:

@@ -10,13 +10,14 @@ from bolfi_liquids.inference.acquisition.rules import (
     RULES,
     exploration_width,
     log_moments,
+    truncated_normal,
 )
 from bolfi_liquids.inference.gp.process import predict
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.base import RunOutcomes, Surrogate
 from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
 from bolfi_liquids.inference.surrogates.processes import learn_success, log_success
-from scipy.stats import kstest, multivariate_normal, norm, qmc
+from scipy.stats import kstest, multivariate_normal, norm, qmc, truncnorm
 
 from bolfi_liquids import inference
 
@@ -56,6 +57,15 @@ def test_jitter_is_a_normal_of_its_sd_about_the_minimiser():
     interior = (centre > 0.2) & (centre < 0.8)
     z = np.array(drawn)[:, interior].ravel() / 0.05
     assert kstest(z, "norm").pvalue > 1e-4 and 0.68 < z.std() < 1.32  # four of its errors
+
+
+def test_jitter_is_truncated_at_the_bounds():
+    """One of twice its size is found."""
+    rng = np.random.default_rng(0)
+    points = np.array([truncated_normal(rng, np.array([0.02]), 0.05)[0] for _ in range(500)])
+    expected = truncnorm(-0.4, 19.6, loc=0.02, scale=0.05)
+    assert kstest(points, expected.cdf).pvalue > 1e-4
+    assert kstest(points, truncnorm(-0.2, 9.8, loc=0.02, scale=0.1).cdf).pvalue < 1e-4
 
 
 def test_second_moment_agrees_with_the_bivariate_normal():

@@ -6,8 +6,7 @@ import arviz_base
 import numpy as np
 import pandas as pd
 import pytest
-from bolfi_liquids.inference.checks import one_replicate as draws
-from bolfi_liquids.inference.checks import ranks
+from bolfi_liquids.inference.checks import one_replicate, ranks
 from scipy.stats import binom, chisquare
 
 ALPHA = 1e-4  # false alarms per test
@@ -27,10 +26,10 @@ def test_reads_mappings_and_trees_alike():
     tree = arviz_base.from_dict({"posterior": made})
     wanted = np.stack([made["a"], made["b"]], -1)
     for given in (made, tree, tree["posterior"], tree["posterior"].to_dataset()):
-        np.testing.assert_array_equal(draws.posterior_array(given, ("a", "b")), wanted)
+        np.testing.assert_array_equal(one_replicate.posterior_array(given, ("a", "b")), wanted)
     flat = {name: column.ravel() for name, column in made.items()}
     for given in (flat, pd.DataFrame(flat)):
-        assert draws.posterior_array(given, ("a", "b")).shape == (1, 6, 2)
+        assert one_replicate.posterior_array(given, ("a", "b")).shape == (1, 6, 2)
 
 
 def test_refuses_other_forms():
@@ -42,7 +41,7 @@ def test_refuses_other_forms():
         (np.zeros((3, 2)), "name -> draws"),
     ):
         with pytest.raises(ValueError, match=said):
-            draws.posterior_array(made, ("a", "b"))
+            one_replicate.posterior_array(made, ("a", "b"))
 
 
 def test_effective_size_of_known_chains():
@@ -50,8 +49,8 @@ def test_effective_size_of_known_chains():
     for correlation in (0.0, 0.6, 0.9):
         array = chains(correlation, (4, 2000))
         truth = 8000 * (1.0 - correlation) / (1.0 + correlation)
-        assert draws.effective_size(array) == pytest.approx(truth, rel=0.35)
-    assert draws.effective_size(np.ones((2, 50, 1))) == 1.0  # a chain that never moves
+        assert one_replicate.effective_size(array) == pytest.approx(truth, rel=0.35)
+    assert one_replicate.effective_size(np.ones((2, 50, 1))) == 1.0  # a chain that never moves
 
 
 def test_thinned_draws_are_no_longer_correlated():
@@ -59,7 +58,7 @@ def test_thinned_draws_are_no_longer_correlated():
     products = []
     for seed in range(12):
         array = chains(0.95, (2, 8000), seed)
-        kept = draws.thin(array, 10**4, draws.effective_size(array))[:, 0]
+        kept = one_replicate.thin(array, 10**4, one_replicate.effective_size(array))[:, 0]
         products.append(kept[1:] * kept[:-1])
     pooled = np.concatenate(products)
     assert len(pooled) > 1200
@@ -68,9 +67,9 @@ def test_thinned_draws_are_no_longer_correlated():
 
 def test_keeps_no_more_than_there_are():
     array = np.arange(20.0).reshape(1, 20, 1)
-    np.testing.assert_array_equal(draws.thin(array, 63, np.inf), array[0])
-    assert len(draws.thin(array, 63, 8.0)) == 4
-    assert len(draws.thin(array, 63, 1.0)) == 1
+    np.testing.assert_array_equal(one_replicate.thin(array, 63, np.inf), array[0])
+    assert len(one_replicate.thin(array, 63, 8.0)) == 4
+    assert len(one_replicate.thin(array, 63, 1.0)) == 1
 
 
 def test_quantiles_are_uniform_whatever_the_number_of_draws():

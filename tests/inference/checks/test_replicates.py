@@ -154,6 +154,12 @@ def test_a_store_refuses_other_settings_and_welcomes_more_replicates(tmp_path):
     ):
         with pytest.raises(ValueError, match=rf"other settings .*\({named}: stored"):
             run(n=2, store=store, **changed)
+    long, other = "x" * 60 + "a" + "z" * 60, "x" * 60 + "b" + "z" * 60
+    run(n=2, store=tmp_path / "long.sqlite", identity=long)
+    with pytest.raises(
+        ValueError, match=r"identity: stored \.\.\.x+az+\.\.\., now \.\.\.x+bz+\.\.\.\)"
+    ):
+        run(n=2, store=tmp_path / "long.sqlite", identity=other)
     again = run(n=4, store=store)  # of another time limit, which decides no draw
     assert len(again) == 4
     np.testing.assert_array_equal(again.draws[:2], first.draws)

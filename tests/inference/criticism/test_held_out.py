@@ -95,6 +95,14 @@ def test_an_explanation_that_predicts_the_same_gains_nothing():
     assert np.mean([holds([one]) for one in found]) < 0.05
 
 
+@pytest.mark.slow
+def test_noise_given_too_small_refuses_the_right_explanation():
+    """Most often: eight runs know their own noise, and so the floor, to some 30 %."""
+    quiet = criticism.KnownNoise(0.05)
+    found = [judged(number, acts=1.0, believed=quiet) for number in range(20)]
+    assert np.mean([holds([one]) for one in found]) < 0.25
+
+
 def error_of(freedom):
     """A simulator that is wrong by .2, as known from so many clean sets."""
     autocovariance = 0.2**2 * np.exp(-np.arange(N) / 10.0)

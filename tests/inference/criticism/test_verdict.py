@@ -58,7 +58,7 @@ def test_held_out_data_tell_explanations_apart():
     [
         candidate("drag", gain=20.0, p_value=0.01),
         candidate("drag", gain=2.0),
-        candidate("drag", gain=20.0, predicted=False),
+        candidate("drag", gain=20.0, unpredicted="it raised"),
         candidate("drag", gain=20.0, gaps=(REFUTES,)),
         candidate("drag", gain=20.0, refitted=False),
         candidate("drag", gain=20.0, needed=False),
@@ -67,14 +67,14 @@ def test_held_out_data_tell_explanations_apart():
 )
 def test_what_explains_nothing_is_not_named(poor):
     assert verdict(poor) == ("unknown", ())
-    good = {"gaps": (), "predicted": True, "refitted": True, "needed": True}
+    good = {"gaps": (), "unpredicted": "", "refitted": True, "needed": True}
     better = replace(poor, check=FITS, gain=20.0, **good)
     assert verdict(better) == ("effect", ("drag",))
 
 
 def test_held_out_data_decide_only_where_there_is_something_to_explain():
     """An effect may be tried on data with which the base model agrees, if the user asks."""
-    refuted = [candidate("drag", gain=20.0, predicted=False)]
+    refuted = [candidate("drag", gain=20.0, unpredicted="it raised")]
     found = conclude(REJECTED, refuted)
     assert (found.kind, found.effects) == ("unknown", ())
     assert "drag" in found.reason and found.reason != conclude(REJECTED, []).reason

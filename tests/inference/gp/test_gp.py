@@ -11,6 +11,7 @@ from bolfi_liquids.inference.gp.process import (
     Data,
     Hyper,
     condition,
+    fantasize,
     inverse_cholesky,
     leave_one_out,
     padded,
@@ -91,6 +92,21 @@ def test_what_is_found_of_a_process_depends_on_no_other():
                 np.testing.assert_array_equal(whole[i], alone[0])
         one, other = (predict(condition(*of), data.u)[0] for of in ((hyper, data), own))
         np.testing.assert_allclose(one[-1:], other, rtol=1e-7, atol=1e-9)
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_fantasies_have_the_spread_that_is_given_or_the_median(rows, given):
+    u, y = rows
+    spread, new = np.linspace(0.5, 2.0, N), np.array([[0.4, 0.7], [0.1, 0.2]])
+    due = np.array([0.6, 3.0]) if given else np.full(2, np.median(spread))
+    fitted = condition(HYPER, Data(u, y, spread=spread))
+    mean = predict(fitted, new)[0]
+    both = np.concatenate([u, new]), np.concatenate([y, mean], axis=1)
+    again = condition(HYPER, Data(*both, spread=np.concatenate([spread, due])))
+    fantasized = fantasize(fitted, new, due if given else None)
+    for one, other in zip(predict(fantasized, u), predict(again, u), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9)
+    np.testing.assert_allclose(predict(fantasized, u)[0], predict(fitted, u)[0], rtol=1e-7)
 
 
 def test_coordinates_of_a_prior_that_fades_out_are_its_normal_scores(rows):

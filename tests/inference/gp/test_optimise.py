@@ -21,10 +21,10 @@ def wells(u):
     [
         (bowl, [0.0, 0.0], [1.0, 1.0], CENTRE),
         (bowl, [0.8, 0.1], [0.9, 0.4], [0.8, 0.2]),
-        (wells, [0.0, 0.0], [0.5, 1.0], [0.256, 0.244]),  # a deeper well lies outside
+        (wells, [0.0, 0.0], [0.5, 1.0], [0.25633, 0.24367]),  # a deeper well lies outside
     ],
     ids=["inside", "one wall", "outside"],
 )
 def test_the_least_value_in_a_box_is_found(objective, low, high, expected):
     found = minimise_in_box(objective, 2, np.array(low), np.array(high))
-    np.testing.assert_allclose(found, expected, atol=1e-2)
+    np.testing.assert_allclose(found, expected, atol=1e-3)

@@ -90,7 +90,7 @@ def test_other_noise_is_refused(prior, gappy, noise):
 
 def test_noise_that_reads_two_ways_is_refused():
     observed = np.array([[1.0, np.nan], [np.nan, 2.0]])
-    with pytest.raises(ValueError, match="not two of these"):
+    with pytest.raises(ValueError, match=r"give sds as \[\d+\]"):
         SignalFamily(noise=np.full((2, 2), 0.1)).view(observed)
     given = SignalFamily(noise=[0.1, 0.1]).view(observed).scale.given
     np.testing.assert_allclose(given.white, 0.01)

@@ -98,7 +98,7 @@ def test_all_simulations_of_one_identity(tmp_path):
 
 def test_simulations_that_are_not_alike_are_refused():
     with inference.SimulationBank() as bank:
-        with pytest.raises(ValueError, match="identity='id', got None"):
+        with pytest.raises(ValueError, match="identity='id', got none$"):
             bank.simulations("id")
         for a in (2, 3):
             bank.put("id", {"a": a}, 0, simulations.Simulation(np.zeros(a), None, 0.0))
@@ -146,6 +146,30 @@ def test_a_claim_of_a_process_ends_with_it(tmp_path):
             with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as late:
                 assert late.stdout.readline().strip() == "False"
                 late.kill()
+
+
+WRITE_50 = """
+import sys
+import numpy as np
+from bolfi_liquids import inference
+from bolfi_liquids.inference import simulations
+with inference.SimulationBank(sys.argv[1]) as bank:
+    for seed in range(int(sys.argv[2]), int(sys.argv[2]) + 50):
+        bank.put("id", {"a": 1.0}, seed, simulations.Simulation(np.full(20, seed), None, 0.0))
+"""
+
+
+def test_processes_may_write_a_file_at_once(tmp_path):
+    """The same rows, too."""
+    path = tmp_path / "shared.sqlite"
+    workers = [
+        subprocess.Popen([sys.executable, "-c", WRITE_50, str(path), first])
+        for first in ("0", "25")
+    ]
+    assert [worker.wait(60.0) for worker in workers] == [0, 0]
+    with inference.SimulationBank(path) as bank:
+        assert len(bank) == 75
+        np.testing.assert_array_equal(bank.simulations("id").signals[:, 0], np.arange(75.0))
 
 
 TOGETHER = """
@@ -266,6 +290,8 @@ def test_the_same_job_twice_in_a_batch_is_simulated_once():
     "change",
     [
         "signal = zeroblob(length(signal))",
+        "seconds = 2 * seconds",
+        "error = 'raised'",
         "shape='[1]'",
     ],
 )
@@ -278,6 +304,7 @@ def test_a_damaged_row_counts_as_not_simulated(tmp_path, caplog, change):
         connection.execute(f"UPDATE simulation SET {change} WHERE seed = 0")
     with inference.SimulationBank(path) as bank:
         assert len(bank.simulations("line").seeds) == 1
+        assert len(bank) == 2  # to read them all writes nothing
         assert bank.get("line", THETA, 0) is None and bank.get("line", THETA, 1) is not None
         assert "damaged row" in caplog.text
         bank.put("line", THETA, 0, made)

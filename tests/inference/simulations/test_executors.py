@@ -163,7 +163,7 @@ def test_keeps_batch_in_flight_and_no_more(prior, observed, simulate):
 
 
 @pytest.mark.slow
-def test_a_dead_worker_isexplained_and_the_rest_is_kept(
+def test_a_dead_worker_is_explained_and_the_rest_is_kept(
     tmp_path, prior, observed, by_hand, worker_side
 ):
     path, mended = tmp_path / "b.sqlite", tmp_path / "mended"
@@ -194,7 +194,7 @@ def test_a_worker_of_dask_that_dies_costs_one_run(tmp_path, prior, observed, wor
     assert str(fit.simulations["error"][6].item()).startswith("KilledWorker: ")
 
 
-def test_a_simulator_that_cannot_travel_isexplained(prior, observed, simulate):
+def test_a_simulator_that_cannot_travel_is_explained(prior, observed, simulate):
     with spawned(1) as pool, pytest.raises(TypeError, match="simulate must be picklable"):
         inference.fit(lambda theta, seeds: None, prior, observed, **options(pool))
 
