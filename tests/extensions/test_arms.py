@@ -102,6 +102,11 @@ def test_a_reader_sees_an_arm_that_goes_on_in_time_and_rests(controller, clock):
     reader.close()
 
 
+def test_the_reader_of_a_real_arm_has_no_way_to_move_it():
+    reader = ur.URController("127.0.0.1").reader(RIG)
+    assert not hasattr(reader, "command") and not hasattr(reader, "stop")
+
+
 def test_taking_control_sets_tool_and_payload_and_moves_nothing(follower):
     state = follower.read()
     assert state.runtime_state == PLAYING
