@@ -225,7 +225,9 @@ class StirringSettings(RigSection, frozen=True):
     @classmethod
     def _is_odd(cls, points: int, info: ValidationInfo) -> int:
         if info.context == CHECK_ENDS and points % 2 == 0:
-            raise ValueError(f"{points} is even: all strokes would lie on one line")
+            raise ValueError(
+                f"{points} is even: all strokes would lie on one line; give an odd number"
+            )
         return points
 
 

@@ -180,9 +180,13 @@ class TargetCheck:
         yield bool(outside.any()), what, "set-point"
         step = float(np.linalg.norm(target[:3] - previous[:3]))
         turn = turn_between(previous[3:], target[3:])
-        for name, value, most in (("step", step, self._step), ("turn", turn, self._turn)):
+        for name, value, most, unit in (
+            ("step", step, self._step, "m"),
+            ("turn", turn, self._turn, "rad"),
+        ):
             beyond = value > most * (1.0 + SPEED_ROUNDING) + 1e-9
-            yield beyond, f"a {name} of {value:.5f} is above {most:.5f} (m, rad)", "set-point"
+            what = f"a {name} of {value:.5f} {unit} is above {most:.5f} {unit}"
+            yield beyond, what, "set-point"
 
 
 def turn_between(first: np.ndarray, second: np.ndarray) -> float:

@@ -179,8 +179,8 @@ BASE = cup_frame(RIG.cup).to_base(STIR.pose[0])
 AWAY = 0.15 / 125.0
 TARGETS = {
     "NaN": ([np.nan, 0, 0, 0, 0, 0], "not six finite"),
-    "step": ([1.01 * AWAY, 0, 0, 0, 0, 0], "a step of .* is above"),
-    "turn": ([0, 0, 0, np.radians(181.0) / 125.0, 0, 0], "a turn of .* is above"),
+    "step": ([1.01 * AWAY, 0, 0, 0, 0, 0], "a step of .* m is above .* m;"),
+    "turn": ([0, 0, 0, np.radians(181.0) / 125.0, 0, 0], "a turn of .* rad is above .* rad;"),
     "box": ([0.051, 0, 0, 0, 0, 0], "x = .* is outside"),
     "below": ([0, 0, -0.03, 0, 0, 0], "z = .* is outside"),
 }
