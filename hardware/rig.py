@@ -273,7 +273,7 @@ class Camera(RigSection, frozen=True):
 
     @property
     def is_device(self) -> bool:
-        """Whether it is a camera, and not a file of pictures."""
+        """Whether it is a camera, and not a file of pictures; a driver is trusted to open one."""
         return isinstance(self.source, int) or self.source.startswith("/dev/") or bool(self.driver)
 
     def faults(self) -> dict[str, bool]:

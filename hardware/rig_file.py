@@ -268,7 +268,8 @@ def _heights(rig: Rig) -> Rules:
 def _cameras(rig: Rig) -> Rules:
     first, second = rig.cameras
     both = f"both have the source {first.source!r}; each needs its own"
-    yield first.source == second.source and first.is_device, "cameras", both
+    same = (first.driver, first.source) == (second.driver, second.source)
+    yield same and first.is_device, "cameras", both
     between, age = 1.0 / min(first.rate, second.rate), rig.limits.frame_age
     often = f"{age} s is below the {between:.3g} s from one picture of a camera to the next"
     yield age < between, "limits.frame_age", often
