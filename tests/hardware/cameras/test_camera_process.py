@@ -330,6 +330,16 @@ def test_lost_and_repeated_pictures_are_counted():
     assert tally.row.worst == pytest.approx(1 / 30)
 
 
+def test_a_camera_that_falls_to_half_its_rate_shows_that():
+    tally, time_, blank = Tally(), 1.0, np.zeros((480, 640), np.uint8)
+    row = FrameMeter(stick_view(RIG, "xz")).measure(Frame(0, 0.0, blank))
+    for rate, seconds in ((30.0, 10.0), (15.0, 2.1)):
+        for k in range(round(seconds * rate)):
+            tally = tallied(tally, row._replace(index=k), time_)
+            time_ += 1.0 / rate
+        assert tally.row.rate == pytest.approx(rate, rel=0.03)
+
+
 @pytest.mark.minutes
 def test_memory_and_open_files_do_not_grow(start):
     running = start(rendered(timing=Timing(rate=60.0), world=moving_world(400.0)))
