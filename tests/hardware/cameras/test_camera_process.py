@@ -304,20 +304,22 @@ def write_that_failed(running, directory):
     return failed
 
 
-def test_a_file_that_may_not_grow_is_told_and_the_camera_goes_on(start, tmp_path):
+@pytest.mark.parametrize("file", ["frames_xz.csv", "xz.mkv"])
+def test_a_file_that_may_not_grow_is_told_and_the_camera_goes_on(start, tmp_path, file):
     running = start(rendered())
     running.wait(lambda row: row.count >= 10)
-    size = (tmp_path / "frames_xz.csv").stat().st_size + 50
+    size = (tmp_path / file).stat().st_size + 50
     # the table's limit stops the video too, whichever of them is written first
     resource.prlimit(running.process.pid, resource.RLIMIT_FSIZE, (size, size))
     assert write_that_failed(running, tmp_path)["file"] in ("frames_xz.csv", "xz.mkv")
     assert len(frames(tmp_path)["index"]) >= 10
 
 
-def test_a_full_disk_is_told_and_the_camera_goes_on(start, tmp_path):
-    (tmp_path / "xz.mkv").symlink_to("/dev/full")  # each write fails as on a full disk (ENOSPC)
+@pytest.mark.parametrize("file", ["frames_xz.csv", "xz.mkv"])
+def test_a_full_disk_is_told_and_the_camera_goes_on(start, tmp_path, file):
+    (tmp_path / file).symlink_to("/dev/full")  # each write fails as on a full disk (ENOSPC)
     failed = write_that_failed(start(rendered()), tmp_path)
-    assert failed["file"] == "xz.mkv" and "make room" in failed["reason"]
+    assert failed["file"] == file and "make room" in failed["reason"]
 
 
 def test_lost_and_repeated_pictures_are_counted():
