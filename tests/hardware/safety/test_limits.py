@@ -203,6 +203,14 @@ def test_set_points_within_their_limits_pass():
     check(BASE, BASE + [0.99 * AWAY, 0, 0, 0, 0, 0])
 
 
+@pytest.mark.parametrize("axis", [0, 3])
+def test_nothing_is_within_a_step_of_a_pose_that_is_not_known(axis):
+    where = BASE.copy()
+    where[axis] = np.nan
+    with pytest.raises(MotionRejected, match="before it, .*nan.* is not finite"):
+        TargetCheck(RIG, "stirring")(where, BASE)
+
+
 def test_orientations_are_compared_as_turns_not_as_numbers():
     # both are half a turn about x
     assert turn_between(np.array([np.pi, 0, 0]), np.array([-np.pi, 0, 0])) < 1e-9
