@@ -211,8 +211,7 @@ def _check_devices(rig: "Rig") -> None:
             raise InputError(
                 f"source = {camera.source!r} is a file",
                 where=f"rig.toml: camera {camera.view}",
-                fix="a real arm moves only while real cameras look on: name a device, or a driver "
-                "of one",
+                fix="a real arm moves only while real cameras look on: name a device",
             )
 
 
