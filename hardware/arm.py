@@ -1,6 +1,7 @@
 """Protocols of robots, by capability; each driver is a file of its own."""
 
 import math
+from abc import abstractmethod
 from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -63,6 +64,7 @@ class Payload(NamedTuple):
 class ArmReader(Protocol):
     """Reads where the arm is, and can do nothing else."""
 
+    @abstractmethod
     def connect(self) -> None:
         """Open the connection.
 
@@ -71,18 +73,22 @@ class ArmReader(Protocol):
         """
         ...
 
+    @abstractmethod
     def read(self) -> ArmState:
         """The latest state; never waits."""
         ...
 
+    @abstractmethod
     def time(self) -> float:
         """Controller's clock of the latest state [s]; a look for whether there is a new one."""
         ...
 
+    @abstractmethod
     def payload(self) -> Payload:
         """Payload on the flange by the controller."""
         ...
 
+    @abstractmethod
     def close(self) -> None:
         """Let the connection go; harmless when repeated."""
         ...
@@ -91,6 +97,7 @@ class ArmReader(Protocol):
 class PathFollower(ArmReader, Protocol):
     """Follows set-points, one a period, and refuses those that break its limits."""
 
+    @abstractmethod
     def take_control(self) -> None:
         """After `connect`: become the one that commands the arm; nothing moves by that.
 
@@ -100,18 +107,22 @@ class PathFollower(ArmReader, Protocol):
         """
         ...
 
+    @abstractmethod
     def tcp(self) -> Six:
         """Tool's centre in the flange's frame [m, rad]; waits for the controller's answer."""
         ...
 
+    @abstractmethod
     def allows(self, pose: np.ndarray) -> bool:
         """Whether the controller's own safety limits allow a pose; waits for its answer."""
         ...
 
+    @abstractmethod
     def arm_watchdog(self) -> None:
         """Make the controller stop the arm when set-points cease."""
         ...
 
+    @abstractmethod
     def command(self, pose: np.ndarray) -> None:
         """Go to a pose in the base frame, shape (6,), within one period.
 
@@ -121,10 +132,12 @@ class PathFollower(ArmReader, Protocol):
         """
         ...
 
+    @abstractmethod
     def stop(self) -> None:
         """Bring the arm to rest and take no further command; returns at once."""
         ...
 
+    @abstractmethod
     def give_up(self) -> None:
         """End the controller's program, on an arm at rest; waits for it, but not for ever."""
         ...
@@ -134,14 +147,17 @@ class Controller(Protocol):
     """Opens its arm in the process that commands it, and can be sent there."""
 
     @property
+    @abstractmethod
     def address(self) -> str:
         """By which a person knows it."""
         ...
 
+    @abstractmethod
     def reader(self, rig: Rig) -> ArmReader:
         """The arm to look at, not connected yet."""
         ...
 
+    @abstractmethod
     def follower(self, rig: Rig, tool: Tool) -> PathFollower:
         """The arm to command with a tool in its gripper, not connected yet."""
         ...

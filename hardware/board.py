@@ -64,7 +64,7 @@ class Row(NamedTuple):
         beat: Host time of the last one [s]; 0 before the first.
         trouble: A `Trouble`.
         count: Pictures read, rows written or ticks made.
-        rate: Of them, per second, since the first.
+        rate: Of them, per second; of a camera over the last two seconds, of others since the first.
         value: Control: progress through the plan in [0, 1]; a camera: the angle it sees [rad].
         worst: Control: greatest lateness of a tick [s]; a camera: greatest age of a picture [s].
     """

@@ -6,6 +6,7 @@ context of the validation; the rig of a recording, by which nothing moves any mo
 them. What numbers must be true together is in `rig_file`.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
@@ -32,14 +33,14 @@ View = Literal["xz", "yz"]
 class RigSection(BaseModel, frozen=True, allow_inf_nan=False):
     """Part of a rig.toml; no change after reading."""
 
-    def faults(self) -> dict[str, bool]:
-        """Contradictions between the section's own numbers: a message, and whether it is true."""
-        return {}
+    def faults(self) -> Iterator[str]:
+        """Contradictions between the section's own numbers."""
+        yield from ()
 
     @model_validator(mode="after")
     def _agrees(self, info: ValidationInfo) -> Self:
         if info.context == CHECK_ENDS:
-            for fault in (what for what, found in self.faults().items() if found):
+            for fault in self.faults():
                 raise ValueError(fault)
         return self
 
@@ -136,10 +137,9 @@ class Robot(RigSection, frozen=True):
     pouring_orientation: Turn
     start: tuple[Angle, Angle, Angle, Angle, Angle, Angle]
 
-    def faults(self) -> dict[str, bool]:
-        base = CONTROLLER_RATE[self.controller]
-        what = f"rate {self.rate:g} Hz does not divide the controller's {base:g} Hz; use 125"
-        return {what: bool(base % self.rate)}
+    def faults(self) -> Iterator[str]:
+        if (base := CONTROLLER_RATE[self.controller]) % self.rate:
+            yield f"rate {self.rate:g} Hz does not divide the controller's {base:g} Hz; use 125"
 
 
 class CupSettings(RigSection, frozen=True):
@@ -153,9 +153,9 @@ class CupSettings(RigSection, frozen=True):
     height: Annotated[float, Within(0.01, 0.4, "m", "a cup is as high as a hand can hold")]
     fill: Length
 
-    def faults(self) -> dict[str, bool]:
-        what = f"fill {self.fill} m is not below height {self.height} m"
-        return {what: self.fill >= self.height}
+    def faults(self) -> Iterator[str]:
+        if self.fill >= self.height:
+            yield f"fill {self.fill} m is not below height {self.height} m"
 
 
 class StickSettings(RigSection, frozen=True):
@@ -171,16 +171,15 @@ class StickSettings(RigSection, frozen=True):
         """Mean over its volume [kg/m3]."""
         return self.mass / (np.pi * self.radius**2 * self.length)
 
-    def faults(self) -> dict[str, bool]:
+    def faults(self) -> Iterator[str]:
         mass = f"mass {self.mass:g} kg"
-        light = (
-            f"{mass} is a density of {self.density:.3g} kg/m3, which no stick has (at least "
-            f"{MIN_STICK_DENSITY:g}); weigh it in kg"
-        )
-        return {
-            f"{mass} looks like grams; convert it to kg": self.density > MAX_STICK_DENSITY,
-            light: self.density < MIN_STICK_DENSITY,
-        }
+        if self.density > MAX_STICK_DENSITY:
+            yield f"{mass} looks like grams; convert it to kg"
+        if self.density < MIN_STICK_DENSITY:
+            yield (
+                f"{mass} is a density of {self.density:.3g} kg/m3, which no stick has (at least "
+                f"{MIN_STICK_DENSITY:g}); weigh it in kg"
+            )
 
 
 class LiquidSettings(RigSection, frozen=True):
@@ -225,7 +224,9 @@ class StirringSettings(RigSection, frozen=True):
     @classmethod
     def _is_odd(cls, points: int, info: ValidationInfo) -> int:
         if info.context == CHECK_ENDS and points % 2 == 0:
-            raise ValueError(f"{points} is even: all strokes would lie on one line")
+            raise ValueError(
+                f"{points} is even: all strokes would lie on one line; give an odd number"
+            )
         return points
 
 
@@ -271,16 +272,14 @@ class Camera(RigSection, frozen=True):
 
     @property
     def is_device(self) -> bool:
-        """Whether it is a camera, and not a file of pictures."""
+        """Whether it is a camera, and not a file of pictures; a driver is trusted to open one."""
         return isinstance(self.source, int) or self.source.startswith("/dev/") or bool(self.driver)
 
-    def faults(self) -> dict[str, bool]:
-        no_lens = self.intrinsics is None and self.focal_length is None
-        look = float(np.linalg.norm(np.subtract(self.target, self.position)))
-        return {
-            "neither intrinsics nor focal_length is given": no_lens,
-            f"position and target are less than {MIN_LOOK:g} m apart": look < MIN_LOOK,
-        }
+    def faults(self) -> Iterator[str]:
+        if self.intrinsics is None and self.focal_length is None:
+            yield "neither intrinsics nor focal_length is given"
+        if np.linalg.norm(np.subtract(self.target, self.position)) < MIN_LOOK:
+            yield f"position and target are less than {MIN_LOOK:g} m apart"
 
 
 class PouringSettings(RigSection, frozen=True):
@@ -318,12 +317,10 @@ class AxisLimits(RigSection, frozen=True):
         """Upper corner, shape (3,)."""
         return np.array([self.x[1], self.y[1], self.z[1]])
 
-    def faults(self) -> dict[str, bool]:
-        axes = {"x": self.x, "y": self.y, "z": self.z}
-        return {
-            f"{axis} must ascend, got [{low}, {high}]": not low < high
-            for axis, (low, high) in axes.items()
-        }
+    def faults(self) -> Iterator[str]:
+        for axis, (low, high) in {"x": self.x, "y": self.y, "z": self.z}.items():
+            if not low < high:
+                yield f"{axis} must ascend, got [{low}, {high}]"
 
 
 class StirringBox(AxisLimits, frozen=True):

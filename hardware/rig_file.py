@@ -46,10 +46,6 @@ class RigFault(NamedTuple):
     fix: str = COMPARE
 
 
-# whether a number is wrong, and the `RigFault` that this is
-Rules = Iterable[tuple[bool, str, str] | tuple[bool, str, str, str]]
-
-
 def open_rig(path: str | Path) -> Rig:
     """Read a rig that a person wrote down.
 
@@ -186,7 +182,7 @@ def contradictions(rig: Rig) -> Iterator[RigFault]:
         rig: Whose numbers are each within their ends.
     """
     for rules in (_speeds, _stick, _heights, _receiver, _cameras, _tools, _start):
-        yield from (RigFault(*fault) for found, *fault in rules(rig) if found)
+        yield from rules(rig)
 
 
 def receiver_fault(rig: Rig, radius: float) -> str:
@@ -206,12 +202,12 @@ def receiver_fault(rig: Rig, radius: float) -> str:
     )
 
 
-def _receiver(rig: Rig) -> Rules:
-    fault = receiver_fault(rig, MIN_CUP_RADIUS)
-    yield bool(fault), "", fault
+def _receiver(rig: Rig) -> Iterator[RigFault]:
+    if fault := receiver_fault(rig, MIN_CUP_RADIUS):
+        yield RigFault("", fault)
 
 
-def _speeds(rig: Rig) -> Rules:
+def _speeds(rig: Rig) -> Iterator[RigFault]:
     for field, limit, unit in (
         ("stirring.speed", "speed", "m/s"),
         ("stirring.approach_speed", "speed", "m/s"),
@@ -220,149 +216,152 @@ def _speeds(rig: Rig) -> Rules:
     ):
         section, _, name = field.partition(".")
         value, most = getattr(getattr(rig, section), name), getattr(rig.limits, limit)
-        yield value > most, field, f"{value} {unit} is above limits.{limit} {most} {unit}"
+        if value > most:
+            yield RigFault(field, f"{value} {unit} is above limits.{limit} {most} {unit}")
 
 
-def _stick(rig: Rig) -> Rules:
+def _stick(rig: Rig) -> Iterator[RigFault]:
     cup, stick, stirring = rig.cup, rig.stick, rig.stirring
     tip, payload = stirring.height - stick.length, rig.robot.payload
-    where = f"the stick's tip is {tip:.3f} m above the floor, outside the liquid"
-    yield (
-        not 0.0 < tip < cup.fill,
-        "stirring.height",
-        f"{where} (cup.fill = {cup.fill} m)",
-    )
-    wall = f"{stirring.radius} m brings the stick to the cup's wall (cup.radius = {cup.radius} m)"
-    yield stirring.radius + stick.radius >= cup.radius, "stirring.radius", wall
-    part = f"{stick.mass} kg is not below robot.payload {payload} kg, of which the stick is a part"
-    yield stick.mass >= payload, "stick.mass", part
+    if not 0.0 < tip < cup.fill:
+        where = f"the stick's tip is {tip:.3f} m above the floor, outside the liquid"
+        yield RigFault("stirring.height", f"{where} (cup.fill = {cup.fill} m)")
+    if stirring.radius + stick.radius >= cup.radius:
+        wall = f"brings the stick to the cup's wall (cup.radius = {cup.radius} m)"
+        yield RigFault("stirring.radius", f"{stirring.radius} m {wall}")
+    if stick.mass >= payload:
+        part = f"is not below robot.payload {payload} kg, of which the stick is a part"
+        yield RigFault("stick.mass", f"{stick.mass} kg {part}")
     wet = cup.fill - tip
     lifted = rig.liquid.density * np.pi * stick.radius**2 * wet * (stick.length - wet / 2)
-    floats = f"{stick.mass} kg floats up in a liquid of {rig.liquid.density:g} kg/m3; it must hang"
-    # moments about the pivot
-    yield lifted >= stick.mass * stick.length / 2, "stick.mass", floats
+    if lifted >= stick.mass * stick.length / 2:  # moments about the pivot
+        floats = f"floats up in a liquid of {rig.liquid.density:g} kg/m3; it must hang"
+        yield RigFault("stick.mass", f"{stick.mass} kg {floats}")
     aside, error = clearance(rig).aside, rig.limits.tracking_error
-    # an arm lags along its way, which is level while it stirs
-    yield (
-        error >= aside,
-        "limits.tracking_error",
-        f"{1e3 * error:.1f} mm, and the stick comes within {1e3 * aside:.1f} mm of the cup's "
-        "wall (cup.radius, stick.radius, stirring.radius)",
-        "give less, 1 mm at least, or a smaller stirring.radius",
-    )
+    if error >= aside:  # an arm lags along its way, which is level while it stirs
+        yield RigFault(
+            "limits.tracking_error",
+            f"{1e3 * error:.1f} mm, and the stick comes within {1e3 * aside:.1f} mm of the cup's "
+            "wall (cup.radius, stick.radius, stirring.radius)",
+            "give less, 1 mm at least, or a smaller stirring.radius",
+        )
 
 
-def _heights(rig: Rig) -> Rules:
+def _heights(rig: Rig) -> Iterator[RigFault]:
     stick, stirring, (low, high) = rig.stick, rig.stirring, rig.limits.stirring.z
-    floor = f"{low} m lets the stick's tip reach the cup's floor (stick.length = {stick.length} m)"
-    yield low <= stick.length, "limits.stirring.z", floor
+    if low <= stick.length:
+        floor = f"lets the stick's tip reach the cup's floor (stick.length = {stick.length} m)"
+        yield RigFault("limits.stirring.z", f"{low} m {floor}")
     clear = stirring.clear_height
-    inside = clear - stick.length <= rig.cup.height
-    yield inside, "stirring.clear_height", f"{clear} m leaves the stick in the cup"
+    if clear - stick.length <= rig.cup.height:
+        yield RigFault("stirring.clear_height", f"{clear} m leaves the stick in the cup")
     for name in ("height", "clear_height"):
         height = getattr(stirring, name)
-        outside = f"{height} m is outside of limits.stirring.z {[low, high]} m"
-        yield not low <= height <= high, f"stirring.{name}", outside
+        if not low <= height <= high:
+            outside = f"{height} m is outside of limits.stirring.z {[low, high]} m"
+            yield RigFault(f"stirring.{name}", outside)
 
 
-def _cameras(rig: Rig) -> Rules:
+def _cameras(rig: Rig) -> Iterator[RigFault]:
     first, second = rig.cameras
-    both = f"both have the source {first.source!r}; each needs its own"
-    yield first.source == second.source and first.is_device, "cameras", both
+    same = (first.driver, first.source) == (second.driver, second.source)
+    if same and first.is_device:
+        yield RigFault("cameras", f"both have the source {first.source!r}; each needs its own")
     between, age = 1.0 / min(first.rate, second.rate), rig.limits.frame_age
-    often = f"{age} s is below the {between:.3g} s from one picture of a camera to the next"
-    yield age < between, "limits.frame_age", often
+    if age < between:
+        often = f"{age} s is below the {between:.3g} s from one picture of a camera to the next"
+        yield RigFault("limits.frame_age", often)
     for number, camera in enumerate(rig.cameras):
         yield from _camera(rig, camera, f"cameras.{number}")
 
 
-def _camera(rig: Rig, camera: Camera, name: str) -> Rules:
+def _camera(rig: Rig, camera: Camera, name: str) -> Iterator[RigFault]:
     position, pivot = np.array(camera.position), np.array([0.0, 0.0, rig.stirring.height])
-    yield (
-        bool(np.hypot(*position[:2]) <= rig.cup.radius),
-        f"{name}.position",
-        f"{list(camera.position)} m is on the cup's axis, or nearer to it than its wall",
-        "measure it again, in the cup's frame: from the centre of its floor, z upwards",
-    )
+    if np.hypot(*position[:2]) <= rig.cup.radius:
+        yield RigFault(
+            f"{name}.position",
+            f"{list(camera.position)} m is on the cup's axis, or nearer to it than its wall",
+            "measure it again, in the cup's frame: from the centre of its floor, z upwards",
+        )
     away = float(np.linalg.norm(camera.marker))
-    yield (
-        away > MAX_MARKER_AWAY,
-        f"{name}.marker",
-        f"{list(camera.marker)} m is {away:.2f} m from the stick's pivot",
-        f"measure it again, from the pivot: {MAX_MARKER_AWAY} m at the most",
-    )
+    if away > MAX_MARKER_AWAY:
+        yield RigFault(
+            f"{name}.marker",
+            f"{list(camera.marker)} m is {away:.2f} m from the stick's pivot",
+            f"measure it again, from the pivot: {MAX_MARKER_AWAY} m at the most",
+        )
     ahead, there = np.subtract(camera.target, position), pivot - position
     angle = _angle(ahead / np.linalg.norm(ahead), there / np.linalg.norm(there))
     view = MAX_VIEW
     if camera.intrinsics is None and camera.focal_length is not None:
         view = float(np.arctan(np.hypot(camera.width, camera.height) / 2.0 / camera.focal_length))
-    yield (
-        angle > view,
-        f"{name}.target",
-        f"the stick's pivot is {np.degrees(angle):.0f} deg from the middle of the picture, and "
-        f"may be {np.degrees(view):.0f} deg",
-        "correct it, position or stirring.height: the camera must see the stick",
-    )
+    if angle > view:
+        yield RigFault(
+            f"{name}.target",
+            f"the stick's pivot is {np.degrees(angle):.0f} deg from the middle of the picture, and "
+            f"may be {np.degrees(view):.0f} deg",
+            "correct it, position or stirring.height: the camera must see the stick",
+        )
 
 
-def _tools(rig: Rig) -> Rules:
+def _tools(rig: Rig) -> Iterator[RigFault]:
     """A stick hangs from a tool that points down; a source cup is upright, and held from a side."""
     for name, turn in _turns(workspace(rig, "stirring")).items():
         tilt = _angle(turn[:, 2], (0.0, 0.0, -1.0))
-        yield (
-            tilt > MAX_TILT["stirring"],
-            "robot.stirring_orientation",
-            f"with it the {name} points {np.degrees(tilt):.0f} deg away from straight down",
-            "correct it or the turn in robot.stirring_tcp: the stick hangs from it",
-        )
+        if tilt > MAX_TILT["stirring"]:
+            yield RigFault(
+                "robot.stirring_orientation",
+                f"with it the {name} points {np.degrees(tilt):.0f} deg away from straight down",
+                "correct it or the turn in robot.stirring_tcp: the stick hangs from it",
+            )
     space = workspace(rig, "pouring")
     flange = _turns(space)["flange"]
     tilt = abs(np.arcsin(np.clip(flange[2, 2], -1.0, 1.0)))
-    yield (
-        tilt > LEVEL_TILT,
-        "robot.pouring_orientation",
-        f"with it the flange points {np.degrees(tilt):.0f} deg away from level",
-        "correct it or the turn in robot.pouring_tcp: the cup is held from a side",
-    )
+    if tilt > LEVEL_TILT:
+        yield RigFault(
+            "robot.pouring_orientation",
+            f"with it the flange points {np.degrees(tilt):.0f} deg away from level",
+            "correct it or the turn in robot.pouring_tcp: the cup is held from a side",
+        )
     heading = np.radians(rig.pouring.heading_deg)
     lip = flange[:, :2] @ space.tcp[:2]  # from the axis, wherever along it the cup is held
     ahead = float(lip @ (np.cos(heading), np.sin(heading), 0.0))
     for value, side in ((float(lip[2]), "above"), (ahead, "on the receiver's side of")):
-        yield (
-            value < LIP_AWAY,
-            "robot.pouring_tcp",
-            f"with it the source's lip is {1e3 * value:.0f} mm {side} the gripper's axis, not "
-            f"{1e3 * LIP_AWAY:.0f} mm or more",
-            "correct it, robot.pouring_orientation or pouring.heading_deg: the cup must be "
-            "upright, and turn towards the receiver",
-        )
+        if value < LIP_AWAY:
+            yield RigFault(
+                "robot.pouring_tcp",
+                f"with it the source's lip is {1e3 * value:.0f} mm {side} the gripper's axis, not "
+                f"{1e3 * LIP_AWAY:.0f} mm or more",
+                "correct it, robot.pouring_orientation or pouring.heading_deg: the cup must be "
+                "upright, and turn towards the receiver",
+            )
 
 
-def _start(rig: Rig) -> Rules:
+def _start(rig: Rig) -> Iterator[RigFault]:
     space, goal = workspace(rig, "stirring"), cup_frame(rig.cup).to_base(above_cup(rig))
-    yield (
-        inverse(space.arm, goal, space.start, tcp=space.tcp) is None,
-        "cup.position",
-        f"{list(rig.cup.position)} m: the arm does not reach the place above the cup",
-        "correct it, or place the cup nearer to the robot",
-    )
+    if inverse(space.arm, goal, space.start, tcp=space.tcp) is None:
+        yield RigFault(
+            "cup.position",
+            f"{list(rig.cup.position)} m: the arm does not reach the place above the cup",
+            "correct it, or place the cup nearer to the robot",
+        )
     at = forward(space.arm, space.start, tcp=space.tcp)
     x, y, z = (at - goal)[:3]
     aside, along = float(np.hypot(x, y)), float(abs(z))
     tilt = _angle(rotation_matrix(at[3:])[:, 2], rotation_matrix(goal[3:])[:, 2])
     # two places of the cup that differ by more than the stick's clearance cannot both be safe
     wall, floor = np.minimum(clearance(rig), MAX_START_AWAY)
-    yield (
-        bool(aside > wall or along > floor or tilt > MAX_TILT["stirring"]),
-        "robot.start",
-        f"these joints put the stick's pivot {1e3 * aside:.1f} mm aside of its place above the "
-        f"cup (cup.position, stirring.clear_height), {1e3 * along:.1f} mm from its height and "
-        f"{np.degrees(tilt):.0f} deg from its direction, where this stick may be "
-        f"{1e3 * wall:.1f} mm, {1e3 * floor:.1f} mm and "
-        f"{np.degrees(MAX_TILT['stirring']):.0f} deg",
-        "move the pivot there by hand and write down the joints, or correct "
-        "cup.position, robot.stirring_tcp or robot.controller",
-    )
+    if aside > wall or along > floor or tilt > MAX_TILT["stirring"]:
+        yield RigFault(
+            "robot.start",
+            f"these joints put the stick's pivot {1e3 * aside:.1f} mm aside of its place above the "
+            f"cup (cup.position, stirring.clear_height), {1e3 * along:.1f} mm from its height and "
+            f"{np.degrees(tilt):.0f} deg from its direction, where this stick may be "
+            f"{1e3 * wall:.1f} mm, {1e3 * floor:.1f} mm and "
+            f"{np.degrees(MAX_TILT['stirring']):.0f} deg",
+            "move the pivot there by hand and write down the joints, or correct "
+            "cup.position, robot.stirring_tcp or robot.controller",
+        )
 
 
 def _turns(space: Workspace) -> dict[str, np.ndarray]:

@@ -31,10 +31,10 @@ def open_camera(camera: Camera) -> FrameSource:
 
     Raises:
         CameraError: It cannot be opened.
-        RigError: There is no such driver.
+        RigError: There is no such driver, or it does not work.
     """
     if camera.driver is not None:
-        return _driver(camera)(camera)
+        return _driven(camera)
     if camera.is_device:
         return Webcam(camera.source, size=(camera.width, camera.height), rate=camera.rate)
     return FilesCamera(str(camera.source), rate=camera.rate)
@@ -45,18 +45,22 @@ def webcams(rig: Rig) -> dict[View, Callable[[], FrameSource]]:
     return {camera.view: partial(open_camera, camera) for camera in rig.cameras}
 
 
-def _driver(camera: Camera) -> Callable[[Camera], FrameSource]:
-    """Class of a driver that is a file of its own, such as "my_camera.py:MyCamera"."""
+def _driven(camera: Camera) -> FrameSource:
+    """Camera of a driver that is a file of its own, such as "my_camera.py:MyCamera"."""
     path, _, name = str(camera.driver).rpartition(":")
-    spec = spec_from_file_location(Path(path).stem, path)
     try:
+        spec = spec_from_file_location(Path(path).stem, path)
         if spec is None or spec.loader is None:
             raise FileNotFoundError(f"{path} is no Python file")
         spec.loader.exec_module(module := module_from_spec(spec))
-        return getattr(module, name)
-    except (OSError, AttributeError) as err:
+        return getattr(module, name)(camera)
+    except CameraError:
+        raise
+    except Exception as err:  # of a file that a person wrote: whatever is wrong in it
+        why = " ".join(str(err).split())
         raise RigError(
-            f"{camera.driver}: {err}",
+            f"{camera.driver}: {type(err).__name__}: {why}",
             where=f"cameras: {camera.view}: driver",
-            fix="give the driver's file, beside rig.toml, and its class: my_camera.py:MyCamera",
+            fix="correct that file, or give the driver's file, beside rig.toml, and its class: "
+            "my_camera.py:MyCamera",
         ) from err

@@ -1,5 +1,6 @@
 """Protocol of cameras: frames with the time at which a camera gave them."""
 
+from abc import abstractmethod
 from typing import Protocol
 
 import numpy as np
@@ -15,6 +16,7 @@ class CameraError(RuntimeError):
 class FrameSource(Protocol):
     """Anything that delivers frames."""
 
+    @abstractmethod
     def read(self) -> Frame | None:
         """The next frame; waits for it. None when there will be no more.
 
@@ -23,6 +25,7 @@ class FrameSource(Protocol):
         """
         ...
 
+    @abstractmethod
     def close(self) -> None:
         """Let the device or file go; harmless when repeated."""
         ...

@@ -7,7 +7,7 @@ at a low `PACE`, which lets the phase go on by the clock while the table rests o
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -45,18 +45,20 @@ def checked(motion: StickMotion) -> StickMotion:
     Raises:
         ValueError: Shapes do not agree, a number is not finite, or times do not rise.
     """
-    size, parts = len(motion.time), motion._asdict()
-    shapes = tuple(np.shape(part) for part in motion)
-    fine = size > 1 and shapes == ((size,), (size, 3), (size, 2))
-    faults = {f"shapes {shapes}; give (T,), (T, 3) and (T, 2) of at least two rows": not fine}
-    faults |= {
-        f"a {name} that is not finite; give numbers only": not np.isfinite(values).all()
-        for name, values in parts.items()
-    }
-    faults["times that do not rise; sort its rows"] = not (np.diff(motion.time) > 0.0).all()
-    for fault in (what for what, found in faults.items() if found):
+    for fault in _faults(motion):
         raise ValueError(f"a stick's motion has {fault}")
     return motion
+
+
+def _faults(motion: StickMotion) -> Iterator[str]:
+    shapes, size = tuple(np.shape(part) for part in motion), np.size(motion.time)
+    if size < 2 or shapes != ((size,), (size, 3), (size, 2)):
+        yield f"shapes {shapes}; give (T,), (T, 3) and (T, 2) of at least two rows"
+    for name, values in motion._asdict().items():
+        if not np.isfinite(values).all():
+            yield f"a {name} that is not finite; give numbers only"
+    if not (np.diff(motion.time) > 0.0).all():
+        yield "times that do not rise; sort its rows"
 
 
 class Replay(NamedTuple):

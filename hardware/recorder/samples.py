@@ -75,12 +75,14 @@ def run_recorder(board: Board, samples: Connection, main: Connection, directory:
     leave_signals_to_main()
     with writing(directory, "recorder") as disk:
         table = disk.write(SAMPLES, lambda: CsvAppender(directory / SAMPLES, Sample._fields))
-        begun, count = host_time(), 0
+        begun, count = 0.0, 0
         for rows in _arriving(samples, main, disk):
             if table is not None and rows:
                 disk.write(SAMPLES, partial(table.append, rows))
+            if rows and not count:
+                begun = rows[0].host
             now, count = host_time(), count + len(rows)
-            rate = count / (now - begun)
+            rate = count / max(now - begun, HEARTBEAT)
             board.write(Who.RECORDER, Row(now, disk.trouble, count, rate, worst=disk.slowest))
         if table is not None:
             disk.write(SAMPLES, table.sync)

@@ -3,7 +3,7 @@
 A path that breaks a limit is refused as a whole; nothing is clipped.
 """
 
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ JOINT_AGREEMENT = 0.1  # rad, of the arm's own joints with ours; another configu
 MOST_SAMPLES = 150_000  # 20 minutes
 SLICE_SAMPLES = 20  # samples, whose check lasts some thousandths of a second
 
-Refusals = Iterable[tuple[bool, str, str]]  # whether it is refused, what is wrong, and where
+Refusals = Iterator[tuple[str, str]]  # what is wrong, and where
 
 
 class Workspace(NamedTuple):
@@ -171,18 +171,22 @@ class TargetCheck:
         _refuse(self._refusals(previous, target))
 
     def _refusals(self, previous: np.ndarray, target: np.ndarray) -> Refusals:
-        six = target.shape == (6,) and bool(np.isfinite(target).all())
-        yield not six, f"the pose {target.tolist()} is not six finite numbers", "set-point"
+        if target.shape != (6,) or not np.isfinite(target).all():
+            yield f"the pose {target.tolist()} is not six finite numbers", "set-point"
+        if not np.isfinite(previous).all():
+            yield f"the pose before it, {previous.tolist()}, is not finite", "set-point"
         position, low, high = self._frame.from_base(target)[:3], self._box.low, self._box.high
-        outside = (position < low - 1e-9) | (position > high + 1e-9)
-        k = int(outside.argmax())
-        what = f"{'xyz'[k]} = {position[k]:.4f} m is outside [{low[k]}, {high[k]}] m"
-        yield bool(outside.any()), what, "set-point"
+        for k in np.flatnonzero((position < low - 1e-9) | (position > high + 1e-9)):
+            what = f"{'xyz'[k]} = {position[k]:.4f} m is outside [{low[k]}, {high[k]}] m"
+            yield what, "set-point"
         step = float(np.linalg.norm(target[:3] - previous[:3]))
         turn = turn_between(previous[3:], target[3:])
-        for name, value, most in (("step", step, self._step), ("turn", turn, self._turn)):
-            beyond = value > most * (1.0 + SPEED_ROUNDING) + 1e-9
-            yield beyond, f"a {name} of {value:.5f} is above {most:.5f} (m, rad)", "set-point"
+        for name, value, most, unit in (
+            ("step", step, self._step, "m"),
+            ("turn", turn, self._turn, "rad"),
+        ):
+            if value > most * (1.0 + SPEED_ROUNDING) + 1e-9:
+                yield f"a {name} of {value:.5f} {unit} is above {most:.5f} {unit}", "set-point"
 
 
 def turn_between(first: np.ndarray, second: np.ndarray) -> float:
@@ -196,33 +200,36 @@ def turn_between(first: np.ndarray, second: np.ndarray) -> float:
 
 
 def _refuse(refusals: Refusals) -> None:
-    for refused, what, where in refusals:
-        if refused:
-            raise MotionRejected(what, where=where, fix="correct the plan or the rig's limits")
+    for what, where in refusals:
+        raise _refused(what, where)
+
+
+def _refused(what: str, where: str) -> MotionRejected:
+    return MotionRejected(what, where=where, fix="correct the plan or the rig's limits")
 
 
 def _numbers(path: PosePath, rate: float) -> Refusals:
     time, pose = path.time, path.pose
-    shapes = f"times of shape {time.shape} and poses of shape {pose.shape}"
     matching = pose.ndim == 2 and pose.shape[1] == 6 and time.shape == pose.shape[:1]
-    yield not matching or len(time) < 2, shapes, "path"
-    yield len(time) > MOST_SAMPLES, f"{len(time)} samples are more than {MOST_SAMPLES}", "path"
-    bad = ~(np.isfinite(pose).all(axis=1) & np.isfinite(time))
-    k = int(bad.argmax())
-    what = f"the pose {pose[k].tolist()} at {time[k]} s is not finite"
-    yield bool(bad.any()), what, f"path at sample {k}"
-    off = np.abs(time - np.arange(len(time)) / rate).max()
-    yield off > 1e-6, f"its times are not those of a {rate:g} Hz clock from 0 s", "path"
+    if not matching or len(time) < 2:
+        yield f"times of shape {time.shape} and poses of shape {pose.shape}", "path"
+    if len(time) > MOST_SAMPLES:
+        yield f"{len(time)} samples are more than {MOST_SAMPLES}", "path"
+    for k in np.flatnonzero(~(np.isfinite(pose).all(axis=1) & np.isfinite(time))):
+        what = f"the pose {pose[k].tolist()} at {time[k]} s is not finite"
+        yield what, f"path at sample {k}"
+    if np.abs(time - np.arange(len(time)) / rate).max() > 1e-6:
+        yield f"its times are not those of a {rate:g} Hz clock from 0 s", "path"
 
 
 def _rates(part: _Part, limits: Limits) -> Refusals:
     speed = np.linalg.norm(part.velocity, axis=1)
-    yield _above(part.between, speed, limits.speed * (1.0 + SPEED_ROUNDING), "speed", "m/s")
+    yield from _above(part.between, speed, limits.speed * (1.0 + SPEED_ROUNDING), "speed", "m/s")
     if len(part.velocity) > 1:
         dt = float(part.between[1] - part.between[0])
         change = np.linalg.norm(np.diff(part.velocity, axis=0), axis=1) / dt
         most = limits.acceleration * (1.0 + SPEED_ROUNDING)
-        yield _above(part.between[:-1], change, most, "acceleration", "m/s2")
+        yield from _above(part.between[:-1], change, most, "acceleration", "m/s2")
 
 
 def _turns(part: _Part, space: Workspace, limits: Limits) -> Refusals:
@@ -230,11 +237,11 @@ def _turns(part: _Part, space: Workspace, limits: Limits) -> Refusals:
 
     turns = Rotation.from_rotvec(part.pose[:, 3:])
     tilt = (Rotation.from_rotvec(space.orientation).inv() * turns).magnitude()
-    yield _above(part.time, np.degrees(tilt), float(np.degrees(space.tilt)), "tilt", "deg")
+    yield from _above(part.time, np.degrees(tilt), float(np.degrees(space.tilt)), "tilt", "deg")
     if len(part.time) > 1:
         rate = (turns[:-1].inv() * turns[1:]).magnitude() / np.diff(part.time)
         most = limits.tilt_rate_deg_s * (1.0 + SPEED_ROUNDING)
-        yield _above(part.time[1:], np.degrees(rate), most, "tilt rate", "deg/s")
+        yield from _above(part.time[1:], np.degrees(rate), most, "tilt rate", "deg/s")
 
 
 def _places(part: _Part, box: AxisLimits, limits: Limits) -> Refusals:
@@ -244,11 +251,9 @@ def _places(part: _Part, box: AxisLimits, limits: Limits) -> Refusals:
     kept = np.asarray(margin(fastest, limits))
     for axis, name in enumerate("xyz"):
         value, low, high = part.pose[:, axis], box.low[axis] + kept, box.high[axis] - kept
-        outside = (value < low - 1e-9) | (value > high + 1e-9)
-        k = int(outside.argmax())
-        what = f"{name} = {value[k]:.4f} m is outside [{low[k]:.4f}, {high[k]:.4f}] m"
-        what += f" (the box less {1e3 * kept[k]:.1f} mm to stop)"
-        yield bool(outside.any()), what, _when(part.time[k])
+        for k in np.flatnonzero((value < low - 1e-9) | (value > high + 1e-9)):
+            what = f"{name} = {value[k]:.4f} m is outside [{low[k]:.4f}, {high[k]:.4f}] m"
+            yield f"{what} (the box less {1e3 * kept[k]:.1f} mm to stop)", _when(part.time[k])
 
 
 def _tip(part: _Part, rig: Rig) -> Refusals:
@@ -257,22 +262,22 @@ def _tip(part: _Part, rig: Rig) -> Refusals:
     inside = z - rig.stick.length < rig.cup.height
     away = np.where(inside, np.hypot(x, y) + rig.stick.radius, 0.0)
     k = int(away.argmax())
-    what = f"the stick is {away[k]:.4f} m from the cup's axis while its tip is in the cup"
-    what += f" (cup.radius = {rig.cup.radius} m)"
-    yield bool(away[k] >= rig.cup.radius), what, _when(part.time[k])
+    if away[k] >= rig.cup.radius:
+        what = f"the stick is {away[k]:.4f} m from the cup's axis while its tip is in the cup"
+        yield f"{what} (cup.radius = {rig.cup.radius} m)", _when(part.time[k])
 
 
 def _first_joints(pose: np.ndarray, space: Workspace, joints: np.ndarray | None) -> np.ndarray:
     """Joints of a path's first pose: those that the arm has, where that is known."""
     near, start = space.start if joints is None else np.asarray(joints), _when(0.0)
-    finite = bool(np.isfinite(near).all())
-    _refuse([(not finite, f"the arm's joints {near.tolist()} are not finite", start)])
+    if not np.isfinite(near).all():
+        raise _refused(f"the arm's joints {near.tolist()} are not finite", start)
     first = inverse(space.arm, pose, near, tcp=space.tcp)
     if first is None:
         raise MotionRejected("no joints reach its first pose", where=start, fix="correct the plan")
     away = float(np.abs(first - near).max())
-    elsewhere = joints is not None and not away <= JOINT_AGREEMENT
-    _refuse([(elsewhere, f"its first pose is {away:.2f} rad of a joint from the arm", start)])
+    if joints is not None and not away <= JOINT_AGREEMENT:
+        raise _refused(f"its first pose is {away:.2f} rad of a joint from the arm", start)
     return first
 
 
@@ -281,20 +286,19 @@ def _reached(part: _Part, space: Workspace, rig: Rig, joints: np.ndarray) -> np.
     begin = max(part.new - 1, 0)
     poses, times = cup_frame(rig.cup).to_base(part.pose[begin:]), part.time[begin:]
     found = follow(space.arm, poses, joints, times=times, tcp=space.tcp)
-    what = (
-        f"joints: {found.status} (largest step {found.largest_step:.3f} rad, fastest "
-        f"{found.fastest:.2f} of a joint's limit)"
-    )
-    _refuse([(found.status != "ok", what, _when(times[found.at or 0]))])
+    if found.status != "ok":
+        what = (
+            f"joints: {found.status} (largest step {found.largest_step:.3f} rad, fastest "
+            f"{found.fastest:.2f} of a joint's limit)"
+        )
+        raise _refused(what, _when(times[found.at or 0]))
     return found.joints[-1]
 
 
-def _above(
-    time: np.ndarray, value: np.ndarray, most: float, name: str, unit: str
-) -> tuple[bool, str, str]:
+def _above(time: np.ndarray, value: np.ndarray, most: float, name: str, unit: str) -> Refusals:
     k = int(value.argmax())
-    what = f"{name} {value[k]:.4f} {unit} is above {most:.4f} {unit}"
-    return not value[k] <= most, what, _when(time[k])
+    if not value[k] <= most:
+        yield f"{name} {value[k]:.4f} {unit} is above {most:.4f} {unit}", _when(time[k])
 
 
 def _when(time: float) -> str:

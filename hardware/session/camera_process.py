@@ -24,6 +24,7 @@ from ..vision.measuring import FrameMeter
 from ..vision.stick_view import stick_view
 
 SAME_PICTURES = 3  # in a row; a camera's noise makes no two alike
+RATE_SECONDS = 2.0  # [s]; a camera that slows down shows its new rate after these
 CLOSING_SECONDS = 0.3  # [s]; how long a camera that does not answer may hold up the end
 WHO: dict[View, Who] = {"xz": Who.CAMERA_XZ, "yz": Who.CAMERA_YZ}
 
@@ -84,7 +85,7 @@ class _Tally(NamedTuple):
     """Counts of the pictures so far."""
 
     row: Row = Row()  # as it goes to the board; its beat is when the last new picture came
-    begun: float = 0.0  # when the first picture came [s]
+    came: tuple[float, ...] = ()  # when those of the last seconds came [s]
     last: int = -1  # index of the last picture
     lost: int = 0
     same: int = 1  # times that the last picture has come in a row
@@ -92,10 +93,11 @@ class _Tally(NamedTuple):
 
 def tallied(tally: _Tally, seen: FrameMeasurement, now: float) -> _Tally:
     """Count another picture, which came at `now` [s]."""
-    before, begun = tally.row, tally.begun or now
+    before = tally.row
+    came = (*(time for time in tally.came if time > now - RATE_SECONDS), now)
     row = before._replace(
         count=before.count + 1,
-        rate=before.count / (now - begun) if now > begun else 0.0,
+        rate=(len(came) - 1) / (now - came[0]) if now > came[0] else 0.0,
         value=seen.angle if line_is_good(seen.flags) else float("nan"),
     )
     same = tally.same + 1
@@ -103,7 +105,7 @@ def tallied(tally: _Tally, seen: FrameMeasurement, now: float) -> _Tally:
         between = now - before.beat if before.beat else 0.0
         row, same = row._replace(beat=now, worst=max(before.worst, between)), 1
     lost = tally.lost + max(seen.index - tally.last - 1, 0)
-    return _Tally(row, begun, seen.index, lost, same)
+    return _Tally(row, came, seen.index, lost, same)
 
 
 class _CameraProcess:

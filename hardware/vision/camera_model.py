@@ -1,7 +1,7 @@
 """A calibrated camera: where it stands, and how it maps points of the cup frame to pixels."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -71,23 +71,30 @@ class CameraModel:
     distortion: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        faults: dict[str, bool] = {}
-        for name, shape in SHAPES.items():
-            value = np.array(getattr(self, name), dtype=float)
-            wrong = value.shape != shape or not np.isfinite(value).all()
-            faults[f"{name} must be finite with shape {shape}, got {value.tolist()}"] = wrong
-            if name in ("rotation", "position"):
-                value.setflags(write=False)
-                object.__setattr__(self, name, value)
-        sizes = f"focal length and size must be positive, got {self.focal} and {self.size}"
-        faults[sizes] = min(*self.focal, *self.size) <= 0
-        turn = self.rotation
-        no_turn = f"rotation must have right-handed unit vectors as rows, got {turn.tolist()}"
-        if turn.shape == (3, 3):
-            proper = np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) and np.linalg.det(turn) > 0
-            faults[no_turn] = not proper
-        for fault in (what for what, found in faults.items() if found):
+        for fault in self._faults():
             raise CameraModelError(f"the camera's {fault}")
+        for name in ("rotation", "position"):
+            value = np.array(getattr(self, name), dtype=float)
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    def _faults(self) -> Iterator[str]:
+        """Each rule needs what those before it have found right."""
+        for name, shape in SHAPES.items():
+            given = getattr(self, name)
+            given = given.tolist() if isinstance(given, np.ndarray) else given
+            try:
+                value = np.asarray(given, dtype=float)
+                right = value.shape == shape and bool(np.isfinite(value).all())
+            except (TypeError, ValueError):  # texts, or rows of different lengths
+                right = False
+            if not right:
+                yield f"{name} must be finite with shape {shape}, got {given!r:.200}"
+        if min(*self.focal, *self.size) <= 0:
+            yield f"focal length and size must be positive, got {self.focal} and {self.size}"
+        turn = np.asarray(self.rotation, dtype=float)
+        if not (np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) and np.linalg.det(turn) > 0):
+            yield f"rotation must have right-handed unit vectors as rows, got {turn.tolist()}"
 
     def to_camera(self, points: np.ndarray) -> np.ndarray:
         """Points of the cup frame [m], shape (..., 3), in the camera frame."""

@@ -10,7 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bolfi_liquids.hardware import MotionRejected, bundled_rig, emulated
-from bolfi_liquids.hardware.arm import LOOKAHEAD, WATCHDOG_PERIOD, LinkLost
+from bolfi_liquids.hardware.arm import (
+    LOOKAHEAD,
+    WATCHDOG_PERIOD,
+    ArmReader,
+    Controller,
+    LinkLost,
+    PathFollower,
+)
 from bolfi_liquids.hardware.motion import stir
 from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.robot import ur
@@ -100,6 +107,21 @@ def test_a_reader_sees_an_arm_that_goes_on_in_time_and_rests(controller, clock):
     assert after.runtime_state != PLAYING and reader.payload().mass == 0.0
     reader.close()
     reader.close()
+
+
+def test_the_reader_of_a_real_arm_has_no_way_to_move_it():
+    reader = ur.URController("127.0.0.1").reader(RIG)
+    assert not hasattr(reader, "command") and not hasattr(reader, "stop")
+
+
+@pytest.mark.parametrize("kind", [ArmReader, PathFollower, Controller])
+def test_an_arm_that_lacks_something_cannot_be_made(kind):
+    """It would not stop, and nobody would be told."""
+    asked = [name for name in dir(kind) if not name.startswith("_")]
+    for name in asked:
+        others = {other: None for other in asked if other != name}
+        with pytest.raises(TypeError, match=f"abstract method '{name}'"):
+            type("Lacking", (kind,), others)()
 
 
 def test_taking_control_sets_tool_and_payload_and_moves_nothing(follower):

@@ -128,11 +128,44 @@ def test_a_rig_s_driver_is_opened_in_the_process_that_reads_it():
     opened.close()
 
 
+FAULTY = {
+    "class Mine(": "SyntaxError: ",
+    "1 / 0": "ZeroDivisionError: ",
+    "import nowhere_at_all": "ModuleNotFoundError: No module named 'nowhere_at_all'",
+    "raise ImportError('line\\nby line')": "ImportError: line by line",
+    "class Mine:\n    pass": "TypeError: ",  # it is called with its section
+    "class Mine:\n    def __init__(self, camera):\n        camera.serial": "AttributeError: ",
+    "from bolfi_liquids.hardware.cameras import FrameSource\n"
+    "class Mine(FrameSource):\n    def __init__(self, _): ...\n    def close(self): ...": "'read'",
+}
+
+
+def refusal(driver):
+    with pytest.raises(RigError) as caught:
+        open_camera(SECTION.model_copy(update={"driver": driver}))
+    assert caught.value.where == "cameras: xz: driver" and driver in caught.value.what
+    assert "\n" not in str(caught.value)
+    return caught.value.what
+
+
 def test_a_driver_that_is_none_is_named():
-    for driver in ("nowhere.py:Camera", f"{EXAMPLE}s", "no_python.txt:C"):
-        with pytest.raises(RigError) as caught:
-            open_camera(SECTION.model_copy(update={"driver": driver}))
-        assert caught.value.where == "cameras: xz: driver"
+    for driver in ("nowhere.py:Camera", f"{EXAMPLE}s", "no_python.txt:C", "Camera"):
+        refusal(driver)
+
+
+@pytest.mark.parametrize("text", FAULTY)
+def test_a_driver_that_does_not_work_is_named_with_what_is_wrong_in_it(tmp_path, text):
+    (tmp_path / "mine.py").write_text(text)
+    assert FAULTY[text] in refusal(f"{tmp_path / 'mine.py'}:Mine")
+
+
+def test_a_driver_whose_camera_cannot_be_used_says_so_itself(tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "from bolfi_liquids.hardware.cameras import CameraError\n"
+        "def mine(camera):\n    raise CameraError('unplugged')"
+    )
+    with pytest.raises(CameraError, match="unplugged"):
+        open_camera(SECTION.model_copy(update={"driver": f"{tmp_path / 'mine.py'}:mine"}))
 
 
 def test_without_opencv_the_extra_is_named(monkeypatch):

@@ -195,15 +195,18 @@ def stepped_loop(monkeypatch):
 
 @pytest.fixture
 def stepped(tmp_path, stepped_loop, step_emulator, at_once):
-    """Makes a `SteppedControl` of a rig, a tool, and where that starts in the cup's frame."""
+    """Makes a `SteppedControl` of a rig, a tool, and where that starts in the cup's frame.
 
-    def make(rig: Rig, tool: Tool, start, *, armed: bool = True, cameras: bool = False):
+    The controller is asked about the start, and about a plan's other poses in the base frame.
+    """
+
+    def make(rig: Rig, tool: Tool, start, *, armed: bool = True, cameras: bool = False, plan=()):
         space, clock = workspace(rig, tool), SteppedClock()
         base = cup_frame(rig.cup).to_base(start)
         joints = inverse(space.arm, base, space.start, tcp=space.tcp)
         emulator = step_emulator(clock, joints=tuple(joints.tolist()), seed=1)
         controller = ur.URController(emulator.address)
-        probes = base[None] if armed else np.empty((0, 6))
+        probes = np.array([base, *plan]) if armed else np.empty((0, 6))
         to = Assignment(rig, controller, tool, armed, str(tmp_path), probes, cameras)
         return stepped_loop(to, clock, emulator)
 

@@ -100,6 +100,7 @@ def test_a_wrong_line_is_named_with_its_field(written, old, new, field):
         open_rig(path)
     assert caught.value.where == (f"{path}: {field}" if field else str(path))
     assert "\n" not in str(caught.value)
+    assert ("give an odd number" in str(caught.value)) == (new == "points = 8")
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
 
 
@@ -120,6 +121,29 @@ def test_what_is_no_rig_file_is_refused(tmp_path, written):
         with pytest.raises(RigError) as caught:
             open_rig(path)
         assert caught.value.where == str(path)
+
+
+def test_two_cameras_differ_in_driver_or_source(written):
+    path = written("source = 0 ", 'driver = "a.py:A"\n')
+    text = path.read_text().replace("source = 1", "")
+    for second, fine in (("b.py:B", True), ("a.py:B", True), ("a.py:A", False)):
+        path.write_text(text.replace('view = "yz"', f'view = "yz"\ndriver = "{second}"'))
+        if fine:
+            assert all(camera.is_device for camera in open_rig(path).cameras)
+        else:
+            with pytest.raises(RigError, match="both have the source 0"):
+                open_rig(path)
+
+
+def test_a_camera_is_a_device_a_driver_or_files():
+    for source, driver, device in (
+        (1, None, True),
+        ("/dev/video2", None, True),
+        ("pictures", None, False),
+        ("serial 7", "mine.py:Mine", True),
+    ):
+        (camera, _) = first_camera(source=source, driver=driver).cameras
+        assert camera.is_device == device
 
 
 def test_paths_count_from_the_file_s_own_directory(written):

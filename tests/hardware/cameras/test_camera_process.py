@@ -304,20 +304,22 @@ def write_that_failed(running, directory):
     return failed
 
 
-def test_a_file_that_may_not_grow_is_told_and_the_camera_goes_on(start, tmp_path):
+@pytest.mark.parametrize("file", ["frames_xz.csv", "xz.mkv"])
+def test_a_file_that_may_not_grow_is_told_and_the_camera_goes_on(start, tmp_path, file):
     running = start(rendered())
     running.wait(lambda row: row.count >= 10)
-    size = (tmp_path / "frames_xz.csv").stat().st_size + 50
+    size = (tmp_path / file).stat().st_size + 50
     # the table's limit stops the video too, whichever of them is written first
     resource.prlimit(running.process.pid, resource.RLIMIT_FSIZE, (size, size))
     assert write_that_failed(running, tmp_path)["file"] in ("frames_xz.csv", "xz.mkv")
     assert len(frames(tmp_path)["index"]) >= 10
 
 
-def test_a_full_disk_is_told_and_the_camera_goes_on(start, tmp_path):
-    (tmp_path / "xz.mkv").symlink_to("/dev/full")  # each write fails as on a full disk (ENOSPC)
+@pytest.mark.parametrize("file", ["frames_xz.csv", "xz.mkv"])
+def test_a_full_disk_is_told_and_the_camera_goes_on(start, tmp_path, file):
+    (tmp_path / file).symlink_to("/dev/full")  # each write fails as on a full disk (ENOSPC)
     failed = write_that_failed(start(rendered()), tmp_path)
-    assert failed["file"] == "xz.mkv" and "make room" in failed["reason"]
+    assert failed["file"] == file and "make room" in failed["reason"]
 
 
 def test_lost_and_repeated_pictures_are_counted():
@@ -328,6 +330,16 @@ def test_lost_and_repeated_pictures_are_counted():
     assert (tally.row.count, tally.lost, tally.same) == (6, 5, 3)
     assert tally.row.beat == pytest.approx(1.1)
     assert tally.row.worst == pytest.approx(1 / 30)
+
+
+def test_a_camera_that_falls_to_half_its_rate_shows_that():
+    tally, time_, blank = Tally(), 1.0, np.zeros((480, 640), np.uint8)
+    row = FrameMeter(stick_view(RIG, "xz")).measure(Frame(0, 0.0, blank))
+    for rate, seconds in ((30.0, 10.0), (15.0, 2.1)):
+        for k in range(round(seconds * rate)):
+            tally = tallied(tally, row._replace(index=k), time_)
+            time_ += 1.0 / rate
+        assert tally.row.rate == pytest.approx(rate, rel=0.03)
 
 
 @pytest.mark.minutes

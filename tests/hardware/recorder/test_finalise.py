@@ -1,5 +1,7 @@
 import errno
 import json
+import subprocess
+import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -314,6 +316,15 @@ def event(source, kind, reason):
             "aborted",
             "camera xz gives no times; camera_xz: bad stamps: from frame 812 on",
         ),
+        (
+            (
+                event("control", "stopped", "recorder cannot write"),
+                event("recorder", "write_failed", "samples.csv: full"),
+            ),
+            "",
+            "aborted",
+            "recorder cannot write; recorder: write failed: samples.csv: full",
+        ),
     ],
 )
 def test_only_control_s_word_makes_a_recording_complete(events, cut, status, reason):
@@ -371,6 +382,22 @@ def test_a_disk_that_is_full_at_the_start_leaves_nothing_in_the_way(tmp_path, mo
         patch.setattr("os.posix_fallocate", full)
         with pytest.raises(RigError, match="make room"):
             start_directory(tmp_path / "a", RIG)
+    start_directory(tmp_path / "a", RIG)
+
+
+LIMITED = """
+import resource, sys
+from bolfi_liquids.hardware.recorder.directory import start_directory
+from bolfi_liquids.hardware.rig_file import bundled_rig
+resource.setrlimit(resource.RLIMIT_FSIZE, (100, resource.RLIM_INFINITY))
+start_directory(sys.argv[1], bundled_rig())
+"""
+
+
+def test_a_rig_file_that_is_not_written_whole_is_not_left(tmp_path):
+    command = [sys.executable, "-c", LIMITED, str(tmp_path / "a")]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert "File too large; make room" in done.stderr
     start_directory(tmp_path / "a", RIG)
 
 

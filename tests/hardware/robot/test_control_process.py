@@ -213,7 +213,7 @@ def rehearsal(stepped_loop, tmp_path):
     def start(rig=QUICK):
         controller = emulated(rig, PATH.pose[0]).controller
         clock = SteppedClock(controller.begun)
-        arm, probes = controller._replace(clock=clock), np.empty((0, 6))
+        arm, probes = controller._replace(clock=clock), FRAME.to_base(PATH.pose[:1])
         to = Assignment(rig, arm, "stirring", True, str(tmp_path), probes, cameras=False)
         return stepped_loop(to, clock)
 
@@ -233,6 +233,7 @@ def test_a_path_is_followed_recorded_and_logged(request, arm):
     assert {check.name for check in checked.checks} >= {
         *("connection", "robot mode", "safety", "program", "box", "payload", "tool's centre"),
         *("force at rest", "recorder", "disk", "kinematics", "speed slider", "at rest"),
+        "controller's limits",
     }
     assert len(told.readings) > 10 and all(reading.green for reading in told.readings)
     assert done.robot_time - began.robot_time == pytest.approx(PATH.duration, abs=2.5 * PERIOD)
@@ -278,6 +279,20 @@ def test_an_arm_outside_its_box_is_not_armed(control):
     assert "box: the tool is at" in failures(checked.checks)
     assert one.events("refused") and checked.pose is None
     assert one.emulator.controller.started == 0
+
+
+def test_a_plan_with_a_pose_that_the_controller_does_not_allow_is_not_armed(control):
+    far = np.array([3.0, 0.0, 0.2, np.pi, 0.0, 0.0])
+    one = control(plan=[far])
+    assert one.run() == 1
+    (checked,) = one.reports
+    told = failures(checked.checks)
+    assert told == "controller's limits: 1 of 2 poses of the plan are within them"
+    assert one.events("refused")
+    # its program ends, and has moved nothing
+    one.clock.sleep(1.0)
+    assert one.emulator.controller.snapshot.runtime_state == 1
+    assert not one.moved
 
 
 def changed(**change):

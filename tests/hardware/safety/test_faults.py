@@ -22,8 +22,8 @@ NAMES = (
 )
 
 
-# what only the watchdog and the real library can show; `test_control_faults` has the arm's answer
-# to the others on a stepped clock, and `test_session` main's end
+# what only the watchdog and the real library can show; `robot/test_control_process` has the arm's
+# answer to the others on a stepped clock, and `session/test_session` main's end
 IN_CI = ("control process killed", "link dropped")
 
 

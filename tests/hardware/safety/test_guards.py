@@ -85,6 +85,7 @@ CASES = {  # what is seen, and the guard that trips
     "slider": (bad(speed_scaling=0.5), "slider"),
     "camera age": (row(Who.CAMERA_XZ, beat=NOW - 0.16), "camera xz"),
     "camera never": (row(Who.CAMERA_YZ, beat=0.0), "camera yz"),
+    "camera lost": (row(Who.CAMERA_XZ, trouble=Trouble.SOURCE_LOST), "camera xz health"),
     "same picture": (row(Who.CAMERA_YZ, trouble=Trouble.SAME_PICTURE), "camera yz health"),
     "bad stamps": (row(Who.CAMERA_XZ, trouble=Trouble.BAD_STAMPS), "camera xz health"),
     "disk": (row(Who.RECORDER, trouble=Trouble.WRITE_FAILED), "recorder health"),

@@ -59,6 +59,7 @@ ANSWERS = {
     # pre-flight list
     "S3": (
         f"{CONTROL}arm_outside_its_box_is_not_armed",
+        f"{CONTROL}pose_that_the_controller_does_not_allow",
         f"{SESSION}no_controller_is_a_line",
         "hardware/safety/preflight: ",
     ),
@@ -68,6 +69,7 @@ ANSWERS = {
         f"{LIMITS}box_s_margin",
         f"{LIMITS}leaves_the_reach",
         f"{CONTROL}path_that_cannot_be_followed",
+        f"{CONTROL}pose_that_the_controller_does_not_allow",
     ),
     # the watchdog is kicked by the loop alone, while all guards are green
     "S5": (f"{DRIVER}watchdog_stops_the_arm", MATRIX),

@@ -179,8 +179,8 @@ BASE = cup_frame(RIG.cup).to_base(STIR.pose[0])
 AWAY = 0.15 / 125.0
 TARGETS = {
     "NaN": ([np.nan, 0, 0, 0, 0, 0], "not six finite"),
-    "step": ([1.01 * AWAY, 0, 0, 0, 0, 0], "a step of .* is above"),
-    "turn": ([0, 0, 0, np.radians(181.0) / 125.0, 0, 0], "a turn of .* is above"),
+    "step": ([1.01 * AWAY, 0, 0, 0, 0, 0], "a step of .* m is above .* m;"),
+    "turn": ([0, 0, 0, np.radians(181.0) / 125.0, 0, 0], "a turn of .* rad is above .* rad;"),
     "box": ([0.051, 0, 0, 0, 0, 0], "x = .* is outside"),
     "below": ([0, 0, -0.03, 0, 0, 0], "z = .* is outside"),
 }
@@ -201,6 +201,14 @@ def test_set_points_within_their_limits_pass():
     with pytest.raises(MotionRejected, match="not six finite"):
         check(BASE, BASE[:3])
     check(BASE, BASE + [0.99 * AWAY, 0, 0, 0, 0, 0])
+
+
+@pytest.mark.parametrize("axis", [0, 3])
+def test_nothing_is_within_a_step_of_a_pose_that_is_not_known(axis):
+    where = BASE.copy()
+    where[axis] = np.nan
+    with pytest.raises(MotionRejected, match="before it, .*nan.* is not finite"):
+        TargetCheck(RIG, "stirring")(where, BASE)
 
 
 def test_orientations_are_compared_as_turns_not_as_numbers():

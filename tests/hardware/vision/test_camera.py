@@ -98,13 +98,18 @@ def test_a_file_that_is_no_camera_is_named(tmp_path):
     ("name", "value"),
     [
         ("focal", (0.0, 640.0)),
+        ("focal", (640.0, "wide")),
+        ("focal", 640.0),
+        ("size", None),
+        ("size", ((640,), (480, 3))),
         ("position", np.array([0.0, np.nan, 0.0])),
         ("rotation", np.diag([1.0, 1.0, -1.0])),
+        ("rotation", np.eye(2)),
         ("distortion", (0.1,)),
     ],
 )
 def test_impossible_cameras_are_refused(name, value):
-    with pytest.raises(CameraModelError, match=name):
+    with pytest.raises(CameraModelError, match=f"the camera's {name} "):
         camera(**{name: value})
 
 
