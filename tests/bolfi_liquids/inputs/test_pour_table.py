@@ -61,6 +61,8 @@ REFUSED = {
     "negative": ([*ROWS[:2], "water,90,1,1,-1,1"], HEADER, None, "line 4, column retained"),
     "backwards": ([*ROWS[:2], "water,-30,1,1,1,1"], HEADER, None, "angular_velocity_deg_s: -30"),
     "nothing poured": ([*ROWS[:2], "water,90,1,0,0,0"], HEADER, None, "line 4: spilled"),
+    "nothing ever poured": (["w,90,1,0,0,0"] * 3, HEADER, None, "in all: usually 0; remove the"),
+    "a missing distance": ([*ROWS[:2], "water,90,,1,1,1"], HEADER, None, "or remove the line;"),
     "another unit": ([*ROWS[:2], "water,90,1,1e4,1,1"], HEADER, None, "line 4: spilled"),
     "liquids": (ROWS, HEADER.replace("liquid", "Liquid name"), "water", "'liquid'"),
     "numbered": (
