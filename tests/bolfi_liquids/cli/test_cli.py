@@ -54,6 +54,7 @@ REFUSED = {
     "simulate stir --effect stick_mass=1_1": "--effect stick_mass=1_1: '1_1'",
     "simulate stir --out run.nc --seed 2147483648": "--seed: 2147483648;",
     "simulate stir --movie a.avi": "a.avi: unknown kind of movie",
+    "rig calibrate-cameras --view ab": "'--view': 'ab' is not one of",
     "check sbc --noise-deg -1 --out run": "--noise-deg: -1.0;",
     "guide poetry": "no page 'poetry'",
 }
