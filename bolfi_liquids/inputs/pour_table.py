@@ -161,7 +161,10 @@ def table_of(given: Pours | None, where: str) -> PourTable | None:
     Raises:
         InputError: Something else was given, or the file cannot be used.
     """
-    return None if given is None else opened(given, PourTable, open_pours, where, "table of pours")
+    if given is None:
+        return None
+    cure = "a CSV file, or what open_pours returns"
+    return opened(given, PourTable, open_pours, where, "table of pours", cure)
 
 
 def table_and_cups(

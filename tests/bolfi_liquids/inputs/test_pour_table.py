@@ -110,3 +110,5 @@ def test_bundled_pours_fit_the_bundled_cups_and_cups_need_pours():
         check_scene(bundled_pours(liquid), bundled_cups())
     with pytest.raises(InputError, match="^cups: "):
         table_and_cups(None, bundled_cups())
+    with pytest.raises(InputError, match="^pours: 3 is no table of pours; give a CSV file"):
+        table_and_cups(3, None)  # pyright: ignore[reportArgumentType]
