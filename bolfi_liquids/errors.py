@@ -9,6 +9,11 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
 
 
+def one_line(text: str) -> str:
+    """A text without its line breaks; blanks stay, which a path in it may have."""
+    return " ".join(line.strip() for line in text.strip().splitlines())
+
+
 class Argument(str):
     """The place of a fault: an argument by its name in Python, perhaps with more after a blank.
 
@@ -45,7 +50,7 @@ class InputError(ValueError):
         """
         where = self.where.as_typed(options) if isinstance(self.where, Argument) else self.where
         fix = re.sub(r"`(\w+)`", lambda name: options.get(name[1], name[0]), self.fix)
-        return " ".join(f"{where}: {self.what}; {fix}".split())
+        return one_line(f"{where}: {self.what}; {fix}")
 
     @classmethod
     def from_validation(

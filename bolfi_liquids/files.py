@@ -62,7 +62,7 @@ def new_file(path: str | Path, where: str, *, suffix: str = "", replace: bool = 
     Args:
         path: As given.
         where: The option or argument.
-        suffix: In which its name must end.
+        suffix: In which its name must end, in lower or upper case.
         replace: Whether there may be a file already.
 
     Raises:
@@ -70,7 +70,7 @@ def new_file(path: str | Path, where: str, *, suffix: str = "", replace: bool = 
             file, or no file can be made in its directory.
     """
     path = given_path(path, where)
-    ends_otherwise, parent = suffix and path.suffix != suffix, path.parent
+    ends_otherwise, parent = suffix and path.suffix.lower() != suffix, path.parent
     for wrong, at, what, fix in (
         (ends_otherwise, path, f"ends in {path.suffix!r}", f"give a name in {suffix}"),
         (path.exists() and not replace, path, "exists already", "choose another name"),

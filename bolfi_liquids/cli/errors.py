@@ -14,7 +14,7 @@ import typer
 from typer.core import TyperGroup
 from typer.exceptions import TyperException
 
-from ..errors import InputError
+from ..errors import InputError, one_line
 from ..files import disk_errno
 from ..wording import command
 
@@ -92,7 +92,8 @@ def _misused(err: TyperException) -> typer.Exit:
     if message.startswith("Usage:"):
         typer.echo(message)
     else:
-        say(f"error: {message.rstrip('.')}; see --help")
+        rule = message.replace(": Value error, ", ": ", 1).rstrip(".")
+        say(f"error: {rule}; see --help")
     return typer.Exit(USAGE_ERROR)
 
 
@@ -146,7 +147,7 @@ def how_to_go_on(arguments: list[str]) -> str:
 
 def say(line: str) -> None:
     """Print on stderr, in one line."""
-    typer.echo(" ".join(line.split()), err=True)
+    typer.echo(one_line(line), err=True)
 
 
 class _ToStderr(logging.Handler):

@@ -82,12 +82,27 @@ def _declared(settings: Any, name: str) -> FieldInfo:
 def _typed(field: FieldInfo) -> Any:
     """Typer's annotation of a setting: several names are one option that is repeated."""
     kind: Any = field.annotation
+    extra = field.json_schema_extra
+    metavar: Any = extra.get("metavar") if isinstance(extra, dict) else None
     if kind == tuple[str, ...] | None:
-        return Annotated[list[str] | None, typer.Option(help=field.description)]
+        kind = list[str] | None
     if get_origin(kind) is Literal:
-        choices = "|".join(get_args(kind))
-        return Annotated[str, typer.Option(metavar=choices, help=field.description)]
-    return Annotated[kind, typer.Option(help=field.description)]
+        kind, metavar = str, f"<{'|'.join(get_args(kind))}>"
+    return Annotated[kind, typer.Option(metavar=metavar, help=_help(field))]
+
+
+def _help(field: FieldInfo) -> str:
+    """What a setting means, and its limits much as typer writes those of other options."""
+
+    def ends(**signs: str) -> list[tuple[Any, str]]:
+        rules = [
+            (getattr(one, rule, None), signs[rule]) for one in field.metadata for rule in signs
+        ]
+        return [(end, sign) for end, sign in rules if end is not None]
+
+    low = "".join(f"{end}{sign}" for end, sign in ends(ge="<=", gt="<"))
+    high = "".join(f"{sign}{end}" for end, sign in ends(le="<=", lt="<"))
+    return f"{field.description}  [{low}x{high}]" if low or high else f"{field.description}"
 
 
 def typed_options(ctx: typer.Context) -> list[str]:
@@ -125,7 +140,9 @@ class ComputeOptions:
     """
 
     workers: Annotated[int | None, helped("Processes that simulate; 1 is this process.", ge=1)] = 1
-    dask: Annotated[str | None, helped("Address of a Dask scheduler to simulate on.")] = None
+    dask: Annotated[
+        str | None, helped("Of a Dask scheduler to simulate on.", metavar="ADDRESS")
+    ] = None
     timeout: Annotated[float | None, helped("Seconds that one simulation may take.", gt=0)] = None
 
     @contextmanager
@@ -167,7 +184,7 @@ CupsOption = Annotated[
     typer.Option("--cups", metavar="FILE", help="cups.toml; without it, the bundled one."),
 ]
 ParticlesOption = Annotated[
-    int, typer.Option("--particles", help=_declared(CalibrationSettings, "particles").description)
+    int, typer.Option("--particles", help=_help(_declared(CalibrationSettings, "particles")))
 ]
 LiquidOption = Annotated[
     str | None,

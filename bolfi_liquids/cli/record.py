@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..online.settings import OnlineSettings
 from ..wording import command
 from .errors import ABORTED, FAILED, INTERRUPTED, Aborted
-from .options import CupsOption, RigOption, check_needed, check_one, examples
+from .options import RigOption, check_needed, check_one, examples
 
 if TYPE_CHECKING:
     from ..hardware import Check
@@ -31,12 +31,15 @@ def record(  # noqa: PLR0913  an option each
     emulator: Annotated[
         bool, typer.Option("--emulator", help="All of it with an emulated arm and cameras.")
     ] = False,
-    viscosity: Annotated[float, typer.Option(help="Of the emulated liquid [Pa s].")] = 1.0,
+    viscosity: Annotated[float, typer.Option(help="With --emulator: of its liquid [Pa s].")] = 1.0,
     calibrate: Annotated[
         Path | None,
         typer.Option(metavar="RUN", help="Calibrate while stirring, and stop when it is enough."),
     ] = None,
-    cups: CupsOption = None,
+    cups: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="With --calibrate: cups.toml; else the bundled one."),
+    ] = None,
     target: Annotated[
         float, typer.Option(help="With --calibrate: spilled share at which stirring may end.")
     ] = OnlineSettings.target,

@@ -56,7 +56,8 @@ def calibrate_cameras(  # noqa: PLR0913  an option each
         typer.Option(metavar="PICTURE", help="Of a thread that hangs; without it, it is taken."),
     ] = None,
     square: Annotated[
-        float, typer.Option(min=0.2, max=20.0, help="Side of a printed square, in cm.")
+        float,
+        typer.Option(min=0.2, max=20.0, metavar="<float>", help="Side of a printed square, in cm."),
     ] = 2.5,
     out: Annotated[
         Path | None,

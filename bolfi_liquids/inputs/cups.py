@@ -30,8 +30,10 @@ def cups_of(given: "Cups | str | Path | None") -> "Cups":
 
     if given is None:
         return bundled_cups()
-    cups = opened(given, Cups, open_cups, Argument("cups"), "pair of cups")
-    return validated(cups.model_dump(), Cups, "cups", FIX)  # copies may hold what no file may
+    cups = opened(given, Cups, open_cups, Argument("cups"), "pair of cups", "a TOML file")
+    if cups is given:  # copies may hold what no file may
+        return validated(cups.model_dump(), Cups, "cups", FIX)
+    return cups
 
 
 def kept_cups(settings: Mapping[str, Any]) -> "Cups":

@@ -84,7 +84,8 @@ def open_recordings(
     """
     if isinstance(sources, Source) or not isinstance(sources, Iterable):
         sources = [sources]
-    return [opened(one, Recording, open_recording, option, "recording") for one in sources]
+    cure = "paths of NetCDF files, or what open_recording returns"
+    return [opened(one, Recording, open_recording, option, "recording", cure) for one in sources]
 
 
 def read_fields(content: bytes, path: Path) -> "Dataset":

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import Argument, InputError
 from .cups import cups_of
-from .limits import ABOVE_0, INF, Limits
+from .limits import INF, Limits
 from .table import Table, is_number, read_table
 from .toml_file import opened
 
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-CELL = "correct the cell, or remove the line"
+REMOVE = "remove the line"
+CELL = f"correct the cell, or {REMOVE}"
 ACTIONS = {
     "angular_velocity_deg_s": Limits("", 1.0, 1000.0, "deg/s", CELL),
     "distance_cm": Limits("", -20.0, 50.0, "cm", CELL),
@@ -113,7 +114,7 @@ def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:
     table.require(names, f"give a column for each of {', '.join(names)}")
     table, liquid = _of_liquid(table, liquid)
     ENOUGH.check(len(table.lines), str(table.path))
-    values = {name: table.numbers(name, complete=True) for name in names}
+    values = {name: table.numbers(name, required=REMOVE) for name in names}
     for name, limits in ACTIONS.items():
         for line, value in zip(table.lines, values[name], strict=True):
             limits.check(value, table.where(line, name))
@@ -140,9 +141,12 @@ def _amounts(table: Table, values: dict[str, NDArray]) -> NDArray[np.float64]:
     """
     amounts = np.stack([values[name] for name in AMOUNTS], axis=1)
     totals = amounts.sum(axis=1)
-    usual = max(float(np.median(totals)), ABOVE_0)
-    ends = max(usual / MAX_TIMES_TOTAL, ABOVE_0), usual * MAX_TIMES_TOTAL
-    whole = Limits(f"{', '.join(AMOUNTS)} in all", *ends, "", "weigh all in one unit")
+    usual, amount = float(np.median(totals)), f"{', '.join(AMOUNTS)} in all"
+    if usual <= 0.0:
+        what, fix = f"{amount}: usually {usual:g}", "remove the lines in which nothing was poured"
+        raise InputError(what, where=str(table.path), fix=fix)
+    ends = usual / MAX_TIMES_TOTAL, usual * MAX_TIMES_TOTAL
+    whole = Limits(amount, *ends, "", "weigh all in one unit")
     for line, row, total in zip(table.lines, amounts, totals, strict=True):
         for name, value in zip(AMOUNTS, row, strict=True):
             drift = max(-value, 0.0) / max(abs(total), usual)
@@ -157,7 +161,10 @@ def table_of(given: Pours | None, where: str) -> PourTable | None:
     Raises:
         InputError: Something else was given, or the file cannot be used.
     """
-    return None if given is None else opened(given, PourTable, open_pours, where, "table of pours")
+    if given is None:
+        return None
+    cure = "a CSV file, or what open_pours returns"
+    return opened(given, PourTable, open_pours, where, "table of pours", cure)
 
 
 def table_and_cups(

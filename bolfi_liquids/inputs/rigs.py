@@ -8,6 +8,8 @@ from .toml_file import opened
 if TYPE_CHECKING:
     from ..hardware import Rig
 
+CURE = "a TOML file, or what hardware.open_rig returns"
+
 
 def rig_of(given: "Rig | str | Path | None") -> "Rig":
     """A rig as it is, the rig of a file, or the bundled one for None.
@@ -21,4 +23,5 @@ def rig_of(given: "Rig | str | Path | None") -> "Rig":
 
     if given is None:
         return bundled_rig()
-    return checked_rig(opened(given, Rig, open_rig, "rig", "rig"))
+    rig = opened(given, Rig, open_rig, "rig", "rig", CURE)
+    return checked_rig(rig) if rig is given else rig

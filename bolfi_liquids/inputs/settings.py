@@ -127,9 +127,10 @@ def checked(where: str = "") -> Callable[[type[T]], type[T]]:
     return decorate
 
 
-def helped(text: str, **limits: Any) -> Any:
-    """The help of an option, and limits of its values."""
-    return Field(description=text, **limits)
+def helped(text: str, *, metavar: str = "", **limits: Any) -> Any:
+    """The help of an option, what stands for its value there, and limits of its values."""
+    shown: Any = {"metavar": metavar} if metavar else None
+    return Field(description=text, json_schema_extra=shown, **limits)
 
 
 @checked()
@@ -189,7 +190,7 @@ class SbcSettings:
 class PourSettings:
     """Settings of the choice of a pour, beside posterior and cups."""
 
-    budget: Annotated[Pours, helped("Pours simulated at most, 24 to 100.")] = 64
+    budget: Annotated[Pours, helped("Pours simulated at most.")] = 64
     iterations: Annotated[Simulations, helped("Angular velocities tried.")] = 31
     draws: Annotated[Count, helped("Posterior draws that each action is tried on.")] = 128
     risk: Annotated[Risk, helped("Spillage to keep low: the mean, or the worst tenth's.")] = "mean"
@@ -200,8 +201,12 @@ class PourSettings:
 class CriticismSettings:
     """Settings of a criticism, beside its data."""
 
-    effects: Annotated[Names, helped("Effect to consider, else all. Repeatable.")] = None
-    accept: Annotated[Names, helped("Effect to add whatever the verdict. Repeatable.")] = None
+    effects: Annotated[
+        Names, helped("Effect to consider, else all. Repeatable.", metavar="EFFECT")
+    ] = None
+    accept: Annotated[
+        Names, helped("Effect to add whatever the verdict. Repeatable.", metavar="EFFECT")
+    ] = None
     seed: Seed = 0
     batch: Annotated[Count, helped("Simulations in one call, where there is no executor.")] = 32
 

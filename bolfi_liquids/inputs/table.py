@@ -30,6 +30,7 @@ NUMBERS = {
     ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?", re.ASCII),
 }
 SAVE_AS_CSV = "save it as CSV in UTF-8"
+LEAVE_EMPTY = "leave it empty where a value is missing"
 
 Row = tuple[int, list[str]]
 """Line of a file, counted from 1, and its cells without blanks around them."""
@@ -101,23 +102,20 @@ class Table:
         self.require([name])
         return self.cells[:, self._places(name)[0]]
 
-    def numbers(
-        self, name: str, *, complete: bool = False, remark: str = ""
-    ) -> NDArray[np.float64]:
+    def numbers(self, name: str, *, required: str = "", remark: str = "") -> NDArray[np.float64]:
         """Numbers of a column, shape (rows,); NaN where one is missing.
 
         Args:
             name: Of the column.
-            complete: Whether none may be missing.
+            required: Where none may be missing: what to do about a cell that cannot be corrected.
             remark: What to say besides if a cell holds something else.
 
         Raises:
             InputError: There is no such column, or a cell holds something else.
         """
         numbers = np.full(len(self.lines), np.nan)
-        empty = "" if complete else ", or leave it empty where a value is missing"
         for at, cell in enumerate(self.column(name)):
-            if cell.lower() in MISSING and not complete:
+            if cell.lower() in MISSING and not required:
                 continue
             try:
                 numbers[at] = parse_number(cell, self.decimal)
@@ -125,9 +123,9 @@ class Table:
                 raise InputError(
                     str(err),
                     where=self.where(self.lines[at], name),
-                    fix=f"correct the cell{empty}; this table has {self.decimal!r} as its decimal "
-                    "sign (a decimal comma needs ';' between the cells), and thousands are not set "
-                    f"apart{remark}",
+                    fix=f"correct the cell, or {required or LEAVE_EMPTY}; this table has "
+                    f"{self.decimal!r} as its decimal sign (a decimal comma needs ';' between "
+                    f"the cells), and thousands are not set apart{remark}",
                 ) from None
         return numbers
 
@@ -256,10 +254,12 @@ def _sheet(path: Path) -> list[Row]:
 
     try:
         sheet = pandas.read_excel(path, header=None, dtype=str, na_filter=False)
-    except (ImportError, OSError, ValueError, LookupError, zipfile.BadZipFile) as err:
-        needs = ", or openpyxl is not installed" if isinstance(err, ImportError) else ""
+    except ImportError as err:
         fix = f"pip install openpyxl, or {SAVE_AS_CSV}"
-        raise InputError(f"no workbook that can be read{needs}", where=str(path), fix=fix) from err
+        raise InputError("openpyxl is not installed", where=str(path), fix=fix) from err
+    except (OSError, ValueError, LookupError, zipfile.BadZipFile) as err:
+        what = "no workbook that can be read"
+        raise InputError(what, where=str(path), fix=SAVE_AS_CSV) from err
     rows = sheet.to_numpy().tolist()
     return [(line, [cell.strip() for cell in row]) for line, row in enumerate(rows, start=1)]
 

@@ -221,8 +221,8 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
             Or `out` is something else that is there already. Nothing was written.
     """
     out = new_file(out, Argument("out"), suffix=".nc")
-    where = Argument("columns")
-    meaning = opened(columns, TableMap, open_table_map, where, "map of columns")
+    where, cure = Argument("columns"), "a TOML file, or what open_table_map returns"
+    meaning = opened(columns, TableMap, open_table_map, where, "map of columns", cure)
     columns_read = [column.column for _, column in meaning.read_columns]
     signs = {"delimiter": meaning.delimiter, "decimal": meaning.decimal, "skip": meaning.skip}
     read = read_table(table, columns_read, **signs)

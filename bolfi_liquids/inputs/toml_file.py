@@ -19,6 +19,7 @@ def opened[Kind](
     open_file: Callable[[str | Path], Kind],
     where: str,
     noun: str,
+    cure: str,
 ) -> Kind:
     """A value as it is, or what a file holds.
 
@@ -28,6 +29,7 @@ def opened[Kind](
         open_file: Reads such a file.
         where: The argument, for a refusal.
         noun: What the value is, likewise.
+        cure: What to give, likewise.
 
     Raises:
         InputError: It is something else, or the file cannot be used.
@@ -36,8 +38,7 @@ def opened[Kind](
         return given
     if isinstance(given, str | Path):
         return open_file(given)
-    fix = f"give the path of its file, or a value of {kind.__name__}"
-    raise InputError(f"{given!r:.80} is no {noun}", where=where, fix=fix)
+    raise InputError(f"{given!r:.80} is no {noun}", where=where, fix=f"give {cure}")
 
 
 def read_toml[Model: BaseModel](path: str | Path, model: type[Model], fix: str) -> Model:

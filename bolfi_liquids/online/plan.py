@@ -74,6 +74,9 @@ def align(plan: Recording, ends: NDArray, so_far: PartialRecording) -> Aligned:
         ends: Of `stroke_ends`.
         so_far: The data.
     """
+    if fault := _fault(so_far):
+        nothing = np.full((len(plan.time), 2), np.nan)
+        return Aligned(nothing, 0, float("-inf"), 0.0, 0.0, fault)
     delays, apart = _delays(plan, ends, so_far)
     done = len(delays) - 1
     covered = float(ends[done - 1]) if done else float("-inf")
@@ -82,12 +85,22 @@ def align(plan: Recording, ends: NDArray, so_far: PartialRecording) -> Aligned:
     observed = np.column_stack([_sampled(wanted, so_far.time, y) for y in so_far.inclination.T])
     observed[plan.time > covered + END_SLACK] = np.nan
     delay = float(delays[max(done - 1, 0)])
-    if np.isfinite(so_far.position).all(axis=1).sum() < 2:
-        refusal = "fewer than two of the arm's positions are known"
-    else:
-        change = np.diff(delays, prepend=0.0)
-        refusal = _refusal(float(change[np.abs(change).argmax()]), apart)
+    change = np.diff(delays, prepend=0.0)
+    refusal = _refusal(float(change[np.abs(change).argmax()]), apart)
     return Aligned(observed, done, covered, delay, apart, refusal)
+
+
+def _fault(so_far: PartialRecording) -> str:
+    """Why these data are no recording; "" if they are."""
+    shapes = tuple(map(np.shape, so_far[:3]))
+    count = np.size(so_far.time)
+    if shapes != ((count,), (count, 3), (count, 2)):
+        return f"time, position and inclination have shapes {shapes}, not (S,), (S, 3), (S, 2)"
+    if not (np.isfinite(so_far.time).all() and (np.diff(so_far.time) > 0.0).all()):
+        return "its times do not increase"
+    if np.isfinite(so_far.position).all(axis=1).sum() < 2:
+        return "fewer than two of the arm's positions are known"
+    return ""
 
 
 def _delays(

@@ -71,8 +71,8 @@ def record_online(
     with OnlineCalibration.start(path, attrs, online, progress=progress) as calibration:
         if not calibration.wait_until_ready():
             raise RuntimeError(f"the calibration is not ready: {calibration.detail}")
-        learning, doing = Learning(calibration), "stirring and calibrating"
-        recording = carried_out(stir, learning.wait, doing, progress=progress)
+        learning, title = Learning(calibration), "stirring and calibrating"
+        recording = carried_out(stir, learning.wait, title, progress=progress)
         calibration.finish(recording, progress=progress)
     return recording
 

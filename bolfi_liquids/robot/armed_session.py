@@ -113,7 +113,7 @@ class SessionView:
 
 @contextmanager
 def armed_session(
-    task: Task, by: "Ask | EmulatedRig", doing: str = "", *, progress: bool = False
+    task: Task, by: "Ask | EmulatedRig", title: str, *, progress: bool = False
 ) -> Iterator[SessionView]:
     """Ask a person, unless the arm is emulated; then a session that may move the arm.
 
@@ -121,7 +121,7 @@ def armed_session(
         task: What will be done.
         by: Shows the plan, and returns the sentence that the plan asks for; or an emulator, which
             nobody is asked about.
-        doing: Title of the view; "" takes the tool's.
+        title: Of the view.
         progress: Whether to show a live view, if stderr is a terminal.
 
     Raises:
@@ -129,7 +129,6 @@ def armed_session(
     """
     from ..hardware import EmulatedRig, Session, SessionSetup, confirm, webcams
 
-    title = doing or task.tool
     if isinstance(by, EmulatedRig):
         arm, make_cameras, source = by
         confirmation, title = None, f"{title}, emulated"

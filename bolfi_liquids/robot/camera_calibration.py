@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import Argument
-from ..files import new_file
+from ..files import new_file, write_whole
 from ..inputs.rigs import rig_of
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ def write_board(path: Path) -> Path:
     from ..hardware.vision.camera_model import opencv
 
     path = new_file(path, Argument("print_board"), suffix=".png", replace=False)
-    opencv().imwrite(str(path), CharucoBoard().print_image())
-    return path
+    _, picture = opencv().imencode(".png", CharucoBoard().print_image())
+    return write_whole(path, lambda temporary: temporary.write_bytes(picture.tobytes()))
 
 
 @contextmanager

@@ -83,7 +83,7 @@ def execute_pour(
         def left() -> str:
             return f"look at {task.out}" if task.out.exists() else "nothing had moved"
 
-        with told_on_stop(left), armed_session(task, by, progress=progress) as view:
+        with told_on_stop(left), armed_session(task, by, task.tool, progress=progress) as view:
             session, (path,) = view.session, task.paths
             session.follow(approach_pour(rig, session.pose(), **chosen.place))
             view.until_done(session.follow(path))

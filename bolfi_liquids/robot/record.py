@@ -1,7 +1,6 @@
 """Recording a stir: the arm, the cameras, and the recording that they leave."""
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -72,7 +71,8 @@ def record(
         view.until_done(number)
         return False
 
-    return carried_out(prepare_stir(rig, out, ask, emulate, cycles), wait, progress=progress)
+    stir = prepare_stir(rig, out, ask, emulate, cycles)
+    return carried_out(stir, wait, stir.task.tool, progress=progress)
 
 
 class PlannedStir(NamedTuple):
@@ -175,7 +175,7 @@ def with_stir(rig: "Rig", plan: StirPlan, liquid: "HiddenLiquid") -> "HiddenLiqu
 def carried_out(
     stir: PlannedStir,
     wait: "Callable[[SessionView, int, PosePath], bool]",
-    doing: str = "",
+    title: str,
     *,
     progress: bool,
 ) -> Recording:
@@ -184,7 +184,7 @@ def carried_out(
     Args:
         stir: Of `prepare_stir`.
         wait: As of `follow_plan`, of a session with its view.
-        doing: Title of the view; "" is stirring.
+        title: Of the view.
         progress: Whether to show a live view, if stderr is a terminal.
 
     Raises:
@@ -200,7 +200,8 @@ def carried_out(
         by = emulated(rig, above_cup(rig), liquid=by, truth=out)
     else:
         _check_devices(rig)
-    with save_on_stop(out), armed_session(stir.task, by, doing, progress=progress) as view:
+    left = partial(what_is_left, out)
+    with told_on_stop(left), armed_session(stir.task, by, title, progress=progress) as view:
         follow_plan(view.session, stir.plan, partial(wait, view))
     return finished(out)
 
@@ -235,12 +236,8 @@ def finished(directory: Path) -> Recording:
     return recording
 
 
-def save_on_stop(directory: Path) -> AbstractContextManager[None]:
-    """Save the frames taken before a stop as a recording; see `told_on_stop`."""
-    return told_on_stop(partial(_left, directory))
-
-
-def _left(directory: Path) -> str:
+def what_is_left(directory: Path) -> str:
+    """Save the frames taken before a stop as a recording, and say where; see `told_on_stop`."""
     from ..hardware import RigError, finalise
 
     if not directory.exists():  # `armed_session` has removed it

@@ -96,9 +96,10 @@ def follow_plan(
     rig, out = session.rig, plan.retract
     follow(approach(rig, session.pose()))
     follow(plan.insert)
-    for stroke in plan.strokes:
+    for number, stroke in enumerate(plan.strokes, start=1):
         follow(stroke)
-        if enough and stroke is not plan.strokes[-1]:
+        # by number: all strokes of a circle are one path
+        if enough and number < len(plan.strokes):
             # the rest at the end, as the plan's last stroke has it
             times = np.arange(0.0, rig.stirring.rest, 1.0 / rig.robot.rate)
             still = np.tile(stroke.pose[-1], (len(times), 1))

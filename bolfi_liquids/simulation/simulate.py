@@ -270,7 +270,7 @@ def described_liquids(values: Mapping[str, ArrayLike], **shared: Any) -> Liquids
     """
     columns = {name: _column(name, value) for name, value in values.items()}
     shapes = {column.shape for column in columns.values()} - {()}
-    if len(shapes) > 1 or any(len(shape) > 1 or 0 in shape for shape in shapes):
+    if len(shapes) > 1:
         given = {name: column.shape for name, column in columns.items()}
         fix = "give numbers, or arrays of one length"
         raise InputError(f"shapes {given}", where="simulate", fix=fix)
@@ -282,19 +282,23 @@ def described_liquids(values: Mapping[str, ArrayLike], **shared: Any) -> Liquids
 
 
 def _column(name: str, value: ArrayLike) -> NDArray:
-    """`value` as an array; `Described` looks at each seed.
+    """`value` as an array, shape () or (B,); `Described` looks at each seed.
 
     Raises:
-        InputError: It is complex, text, or of no one shape.
+        InputError: It is complex, text, of no one shape, of several dimensions, or empty.
     """
-    if name == "seed":
-        return np.asarray(value, dtype=object)
+    fix = "give a number, or an array of them"
     try:
-        return checked_array(name, value)
+        seeds = name == "seed"
+        column = np.asarray(value, dtype=object) if seeds else checked_array(name, value)
     except ValueError as err:
-        raise InputError(
-            f"{value!r:.80}", where=Argument(name), fix="give a number, or an array of them"
-        ) from err
+        raise InputError(f"{value!r:.80}", where=Argument(name), fix=fix) from err
+    if column.ndim > 1:
+        what = f"an array of {column.ndim} dimensions"
+        raise InputError(what, where=Argument(name), fix="give a number, or an array of one")
+    if not column.size:
+        raise InputError("no simulation", where=Argument(name), fix="give at least one value")
+    return column
 
 
 def _replaced(liquids: Liquids, **changes: Any) -> Liquids:
@@ -389,10 +393,11 @@ def _with_rig(
     if not isinstance(sizes, Mapping):
         raise InputError(f"{rig!r:.80}", where=Argument("rig"), fix="give sizes by name")
     weights = [name for name in STICK_WEIGHT if name in sizes]
+    fix = f"give positive {', '.join(LENGTHS)}, and {' or '.join(STICK_WEIGHT)}"
     for name, value in sizes.items():
-        positive = name in RIG_SIZES and checked_number(value, f"rig: {name}") > 0.0
-        if not positive or weights[1:] == [name]:
-            fix = f"give positive {', '.join(LENGTHS)}, and {' or '.join(STICK_WEIGHT)}"
+        if name not in RIG_SIZES:
+            raise InputError(f"{name!s:.80} is no size of a rig", where=Argument("rig"), fix=fix)
+        if checked_number(value, f"rig: {name}") <= 0.0 or weights[1:] == [name]:
             raise InputError(f"{value!r}", where=f"rig: {name}", fix=fix)
     replaced = STICK_WEIGHT if weights else ()
     return {name: value for name, value in attrs.items() if name not in replaced} | dict(sizes)

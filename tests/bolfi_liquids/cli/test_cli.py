@@ -5,7 +5,7 @@ import sqlite3
 import subprocess
 import sys
 from importlib.resources import files
-from typing import Annotated
+from typing import Annotated, Literal
 
 import pytest
 import typer
@@ -54,6 +54,7 @@ REFUSED = {
     "simulate stir --effect stick_mass=1_1": "--effect stick_mass=1_1: '1_1'",
     "simulate stir --out run.nc --seed 2147483648": "--seed: 2147483648;",
     "simulate stir --movie a.avi": "a.avi: unknown kind of movie",
+    "rig calibrate-cameras --view ab": "'--view': 'ab' is not one of",
     "check sbc --noise-deg -1 --out run": "--noise-deg: -1.0;",
     "guide poetry": "no page 'poetry'",
 }
@@ -217,12 +218,13 @@ def test_one_worker_is_this_process():
 
 @checked()
 class Size:
-    width: Annotated[int, helped("In cm.")] = 3
-    height: Annotated[int | None, helped("In cm.")] = None
+    width: Annotated[int, helped("In cm.", ge=1, lt=9)] = 3
+    height: Annotated[int | None, helped("In cm.", gt=0, metavar="CM")] = None
+    colour: Annotated[Literal["red", "blue"], helped("Of all.")] = "red"
 
 
 def test_settings_become_options_and_arrive_whole():
-    app, seen = typer.Typer(), []
+    app, seen = typer.Typer(rich_markup_mode=None), []
 
     @app.command()
     @grouped
@@ -234,4 +236,11 @@ def test_settings_become_options_and_arrive_whole():
     assert CliRunner().invoke(app, ["box", "--height", "7", "--loud"]).exit_code == 0
     assert CliRunner().invoke(app, ["box", "--no-loud", "--width", "1"]).exit_code == 0
     assert CliRunner().invoke(app, ["box", "--loud", "--depth", "7"]).exit_code == 2
+    shown = " ".join(CliRunner().invoke(app, ["--help"], env={"COLUMNS": "80"}).stdout.split())
+    for option in (
+        "--width <int> In cm. [1<=x<9]",
+        "CM In cm. [0<x]",
+        "<red|blue> Of all. [default",
+    ):
+        assert option in shown
     assert seen == [("box", Size(3, 7), True), ("box", Size(1, None), False)]

@@ -2,11 +2,14 @@
 
 import logging
 import pickle
+import shlex
+from pathlib import Path
 
 import pytest
 
 import bolfi_liquids as bl
-from bolfi_liquids.cli.errors import PACKAGE, how_to_go_on, print_notices
+from bolfi_liquids.cli.errors import PACKAGE, how_to_go_on, print_notices, say
+from bolfi_liquids.cli.record import next_commands
 from bolfi_liquids.errors import Argument, InputError
 from bolfi_liquids.inputs.bundled import bundled_recording
 
@@ -74,6 +77,18 @@ def test_who_interrupts_is_told_to_resume_only_what_has_begun(tmp_path, monkeypa
     assert how_to_go_on(typed).endswith(" --resume")
     assert how_to_go_on([*typed, "--resume"]).count("--resume") == 1
     assert "--resume" not in how_to_go_on(["pour", "run"])
+
+
+@pytest.mark.parametrize("path", ["my  stir.nc", "it's.nc", '"a" $b;c.nc'])
+def test_a_printed_command_is_read_by_a_shell_as_it_was_meant(capsys, path):
+    wanted = ["bolfi-liquids", "calibrate", path, "--out", "RUN"]
+    (printed,) = next_commands(Path(path), None)
+    assert shlex.split(printed) == wanted
+    say(how_to_go_on(wanted[1:]))
+    assert shlex.split(capsys.readouterr().err.partition("with: ")[2]) == wanted
+    error = InputError("odd", where="run", fix=f"go on with: {printed}")
+    assert shlex.split(error.as_typed({}).partition("with: ")[2]) == wanted
+    assert [shlex.split(one)[2:] for one in next_commands(Path(), Path(path))] == [[path]] * 2
 
 
 def test_who_interrupts_without_a_place_is_told_to_begin_again(tmp_path, monkeypatch):

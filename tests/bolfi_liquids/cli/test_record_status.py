@@ -7,7 +7,8 @@ from typer.testing import CliRunner
 import bolfi_liquids as bl
 from bolfi_liquids import hardware
 from bolfi_liquids.cli.app import app
-from bolfi_liquids.robot.record import finished, save_on_stop
+from bolfi_liquids.robot.armed_session import told_on_stop
+from bolfi_liquids.robot.record import finished, what_is_left
 
 REASON = "protective stop at 2.6 s"
 
@@ -66,7 +67,7 @@ def test_a_recording_that_was_aborted_too_early_to_be_used_is_aborted(
 def test_a_session_that_is_stopped_says_what_is_left(monkeypatch, tmp_path, stop, status):
     def session(*_, out, **__):
         out.mkdir()
-        with save_on_stop(out):
+        with told_on_stop(lambda: what_is_left(out)):
             raise stop
 
     monkeypatch.setattr("bolfi_liquids.robot.record.record", session)

@@ -10,7 +10,7 @@ def test_cups_are_given_as_they_are_or_not_at_all_and_come_back_from_a_result():
     bundled = bundled_cups()
     assert cups_of(bundled) == cups_of(None) == bundled
     assert kept_cups(bundled.settings()) == bundled
-    with pytest.raises(InputError, match="^cups: "):
+    with pytest.raises(InputError, match="^cups: 3 is no pair of cups; give a TOML file$"):
         cups_of(3)  # pyright: ignore[reportArgumentType]
 
 

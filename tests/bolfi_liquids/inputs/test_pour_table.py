@@ -61,6 +61,8 @@ REFUSED = {
     "negative": ([*ROWS[:2], "water,90,1,1,-1,1"], HEADER, None, "line 4, column retained"),
     "backwards": ([*ROWS[:2], "water,-30,1,1,1,1"], HEADER, None, "angular_velocity_deg_s: -30"),
     "nothing poured": ([*ROWS[:2], "water,90,1,0,0,0"], HEADER, None, "line 4: spilled"),
+    "nothing ever poured": (["w,90,1,0,0,0"] * 3, HEADER, None, "in all: usually 0; remove the"),
+    "a missing distance": ([*ROWS[:2], "water,90,,1,1,1"], HEADER, None, "or remove the line;"),
     "another unit": ([*ROWS[:2], "water,90,1,1e4,1,1"], HEADER, None, "line 4: spilled"),
     "liquids": (ROWS, HEADER.replace("liquid", "Liquid name"), "water", "'liquid'"),
     "numbered": (
@@ -108,3 +110,5 @@ def test_bundled_pours_fit_the_bundled_cups_and_cups_need_pours():
         check_scene(bundled_pours(liquid), bundled_cups())
     with pytest.raises(InputError, match="^cups: "):
         table_and_cups(None, bundled_cups())
+    with pytest.raises(InputError, match="^pours: 3 is no table of pours; give a CSV file"):
+        table_and_cups(3, None)  # pyright: ignore[reportArgumentType]

@@ -151,7 +151,7 @@ def test_what_is_no_recording_is_refused(tmp_path):
     for given, said in ((tmp_path / "none.nc", "no such file"), (tmp_path / "stir.nc", "import")):
         with pytest.raises(bl.InputError, match=said):
             bl.open_recording(given)
-    with pytest.raises(bl.InputError, match="^held_out: 3 is no recording"):
+    with pytest.raises(bl.InputError, match="^held_out: 3 is no recording; give paths of NetCDF"):
         open_recordings([3], "held_out")  # pyright: ignore[reportArgumentType]
 
 

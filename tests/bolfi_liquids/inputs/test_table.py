@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import zipfile
 
 import numpy as np
 import pytest
@@ -111,18 +112,26 @@ def test_odd_numerals_are_refused(table, odd):
     assert odd in refused.value.what
 
 
-def test_an_empty_cell_is_missing_unless_the_column_must_be_complete(table):
+def test_an_empty_cell_is_missing_unless_the_column_requires_it(table):
     read = table("a,b\n1,\n2,n/a\n3,NaN\n")
     assert np.isnan(read.numbers("b")).all()
-    with pytest.raises(InputError, match="line 2, column b"):
-        read.numbers("b", complete=True)
+    with pytest.raises(InputError, match="line 2, column b.*, or remove the line;"):
+        read.numbers("b", required="remove the line")
 
 
 def test_a_damaged_workbook_is_refused(tmp_path):
     path = tmp_path / "table.xlsx"
     path.write_bytes(b"PK\x03\x04" + bytes(range(256)) * 20)
-    with pytest.raises(InputError, match=r"table\.xlsx"):
+    with pytest.raises(InputError, match=r"table\.xlsx.*; save it as CSV in UTF-8$"):
         read_table(path)
+
+
+def test_a_workbook_without_its_reader_names_the_reader(tmp_path, monkeypatch):
+    with zipfile.ZipFile(tmp_path / "table.xlsx", "w") as book:
+        book.writestr("xl/workbook.xml", "")
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    with pytest.raises(InputError, match="pip install openpyxl"):
+        read_table(tmp_path / "table.xlsx")
 
 
 def test_pandas_is_imported_when_a_table_is_read():

@@ -17,6 +17,7 @@ import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids import models
+from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.online import online
 from bolfi_liquids.online.estimate import Answer, Problem
@@ -67,14 +68,22 @@ def so_far(recording, end, off=0.0):
     return PartialRecording(recording.time[seen], path, recording.inclination[seen], now)
 
 
-def replay(recording, of):
-    """Estimates of a finished recording that is handed over stroke by stroke, until one is enough;
-    each stroke waits for the estimate of the one before."""
+def replay(recording, of, *, realtime=False):
+    """Estimates of a finished recording that is handed over stroke by stroke, until one is enough.
+
+    In real time strokes come as fast as they were made; else each waits for the estimate of the
+    one before.
+    """
+    began = time.monotonic()
     for end in of.ends:
+        arrives = began + end - recording.time[0]
+        while realtime and time.monotonic() < arrives:
+            time.sleep(0.02)
+            of.poll()
         before = len(of.estimates)
         of.update(so_far(recording, end))
-        assert until(lambda before=before: len(of.estimates) > before, of), of.detail
-        if of.estimates[-1].is_enough(of.settings):
+        assert realtime or until(lambda before=before: len(of.estimates) > before, of), of.detail
+        if any(one.is_enough(of.settings) for one in of.estimates[-1:]):
             break
     return of.estimates
 
@@ -278,3 +287,19 @@ def test_stops_at_the_target_and_calibrates(short_recording, tmp_path):
     last = estimates[-1].parameters["viscosity"]
     ordinary = calibration.summary.parameters["viscosity"]
     assert last.q05 < ordinary.q95 and ordinary.q05 < last.q95
+
+
+@pytest.mark.minutes  # at full size and in real time; the test above has it of a small one
+def test_the_last_estimate_agrees_with_the_ordinary_calibration(tmp_path):
+    recording = bundled_recording("glycerin")
+    with start(recording, tmp_path / "run", OnlineSettings(target=1e-9)) as of:
+        assert of.wait_until_ready(PATIENCE_S), of.detail
+        estimates = replay(recording, of, realtime=True)
+        assert until(lambda: estimates[-1:] and estimates[-1].strokes == len(of.ends), of), (
+            of.detail
+        )
+        assert until(lambda: len(of.made) > of.settings.design, of), of.detail
+        ordinary = bl.Calibration.open(of.finish(recording, budget=40, progress=False))
+    last = estimates[-1].parameters["viscosity"]
+    other = ordinary.summary.parameters["viscosity"]
+    assert last.q05 < other.q95 and other.q05 < last.q95

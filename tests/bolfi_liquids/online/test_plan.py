@@ -129,6 +129,26 @@ def test_another_stir_is_refused_and_tracking_errors_are_not():
         assert why in refusal and bool(why) == bool(refusal), why
 
 
+def test_what_is_no_recording_is_refused():
+    seen = data(2.0)
+    none = PartialRecording(*(of[:0] for of in seen[:3]), 0.0)
+    twice, missing = seen.time.copy(), seen.time.copy()
+    twice[100], missing[100] = twice[99], np.nan
+    rows = (
+        (none, "positions"),
+        (seen._replace(time=twice), "do not increase"),
+        (seen._replace(time=seen.time[::-1]), "do not increase"),
+        (seen._replace(time=missing), "do not increase"),
+        (seen._replace(time=seen.time[:-1]), "shapes"),
+        (seen._replace(position=seen.position[:, :2]), "shapes"),
+        (seen._replace(inclination=seen.inclination[:, 0]), "shapes"),
+    )
+    for odd, why in rows:
+        aligned = align(PLAN, ENDS, odd)
+        assert why in aligned.refusal and aligned.strokes == 0
+        assert np.isnan(aligned.observed).all()
+
+
 def test_a_plan_needs_a_density_and_a_path():
     rows = ((PATH.time, {}, "liquid_density"), (PATH.time[::-1], ATTRS, "planned path"))
     for time, attrs, where in rows:

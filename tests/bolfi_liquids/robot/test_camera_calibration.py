@@ -1,6 +1,7 @@
 """A camera calibrated by the command, from pictures of a lens and a roll that are known."""
 
 import dataclasses
+import errno
 import json
 import re
 import sys
@@ -15,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from bolfi_liquids.cli.app import app
+from bolfi_liquids.robot.camera_calibration import write_board
 
 sys.path.append(str(Path(__file__).parents[2] / "hardware"))
 from rendered_boards import render_board, render_plumb_line  # noqa: E402
@@ -65,6 +67,19 @@ def test_a_plumb_line_alone_keeps_the_lens(pictures, tmp_path, monkeypatch):
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0 and "roll_deg = " in done.stdout
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_board_is_written_whole_or_it_is_an_error(tmp_path, monkeypatch):
+    made = write_board(tmp_path / "board.PNG")
+    np.testing.assert_array_equal(cv2.imread(str(made), 0), CharucoBoard().print_image())
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "no space")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OSError, match=r"other\.png"):
+        write_board(tmp_path / "other.png")
+    assert [one.name for one in tmp_path.iterdir()] == ["board.PNG"]
 
 
 def test_what_cannot_be_used_is_named(tmp_path, monkeypatch):

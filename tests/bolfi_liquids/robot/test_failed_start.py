@@ -1,13 +1,15 @@
 """What a device that fails before the first motion leaves: nothing in the way of the next try."""
 
+from functools import partial
+
 import pytest
 from bolfi_liquids.hardware.recorder.events import EventLog
 from bolfi_liquids.hardware.session.session import Session
 from bolfi_liquids.hardware.session.setup import CONFIRMATION
 
 from bolfi_liquids import hardware
-from bolfi_liquids.robot.armed_session import Task, armed_session
-from bolfi_liquids.robot.record import save_on_stop
+from bolfi_liquids.robot.armed_session import Task, armed_session, told_on_stop
+from bolfi_liquids.robot.record import what_is_left
 from bolfi_liquids.robot.stir import plan_stir
 
 NOBODY = "127.94.3.2"  # where no controller listens
@@ -22,7 +24,7 @@ def task(tmp_path):
 
 def session(task):
     """With an arm that does not answer, though somebody has agreed."""
-    return armed_session(task, lambda _: CONFIRMATION)
+    return armed_session(task, lambda _: CONFIRMATION, task.tool)
 
 
 def test_a_robot_that_does_not_answer_leaves_no_directory(task):
@@ -61,7 +63,7 @@ def test_a_session_whose_processes_cannot_start_leaves_no_directory(task, monkey
 
 def test_a_session_that_was_stopped_before_any_motion_says_so(tmp_path):
     stopped = pytest.raises(hardware.SessionStopped, match="robot mode; nothing had moved")
-    with stopped, save_on_stop(tmp_path / "gone"):
+    with stopped, told_on_stop(partial(what_is_left, tmp_path / "gone")):
         raise hardware.SessionStopped("robot mode")
 
 

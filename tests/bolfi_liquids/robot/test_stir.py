@@ -16,6 +16,8 @@ from bolfi_liquids.robot.stir import PATHS_AHEAD, follow_plan, plan_stir
 
 RIG = hardware.bundled_rig()
 PLAN = plan_stir(RIG, 2)
+CIRCLE = RIG.stirring.model_copy(update={"pattern": "circle"})
+CIRCLES = plan_stir(RIG.model_copy(update={"stirring": CIRCLE}), 8)
 
 
 class Session:
@@ -48,16 +50,17 @@ def test_a_plan_is_followed_to_its_end():
     assert len(session.awaited) == len(session.ordered)
 
 
-def test_a_stir_that_is_enough_ends_with_a_rest_and_leaves_the_cup_from_there():
-    session, strokes = Session(), list(PLAN.strokes)
+@pytest.mark.parametrize("plan", [PLAN, CIRCLES])
+def test_a_stir_that_is_enough_ends_with_a_rest_and_leaves_the_cup_from_there(plan):
+    session, strokes = Session(), list(plan.strokes)
 
     def enough_after_three(number, path):
         session.wait(number, path)
         return number >= 4  # the way to the cup, into it, and three strokes
 
-    follow_plan(session, PLAN, enough_after_three)
+    follow_plan(session, plan, enough_after_three)
     _, insert, *stirred, still, out = session.ordered
-    assert insert is PLAN.insert
+    assert insert is plan.insert
     assert stirred == strokes[: 3 + PATHS_AHEAD]
     last = stirred[-1].pose[-1]
     assert still.stirring and still.time[-1] >= RIG.stirring.rest - 2.0 / RIG.robot.rate

@@ -143,13 +143,16 @@ def test_a_stick_that_is_weighed_anew_replaces_what_the_recording_says(dataset, 
     ("given", "message"),
     [
         ({"density": [1000.0, 1200.0]}, "^density: "),
-        ({"rig": {"cup_raduis": 0.02}}, "rig: cup_raduis: .*cup_radius"),
+        ({"rig": {"cup_raduis": 0.02}}, "^rig: cup_raduis is no size of a rig; .*cup_radius"),
         ({"rig": {"cup_radius": -0.02}}, "rig: cup_radius"),
         (
             {"rig": {"stick_mass": 0.01, "stick_density": 4000.0}},
             "rig: stick_mass: .*stick_density or stick_mass",
         ),
         ({"viscosity": [0.1, 0.2], "seed": [1, 2, 3]}, "arrays of one length"),
+        ({"viscosity": []}, "^viscosity: no simulation; give at least one value"),
+        ({"seed": []}, "^seed: no simulation"),
+        ({"cohesion": [[0.1, 0.2]]}, "^cohesion: an array of 2 dimensions"),
         ({"viscosity": [0.1, 0.2], "movie": "a.gif"}, "a.gif: arrays were given"),
     ],
 )
