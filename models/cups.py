@@ -130,6 +130,12 @@ class PourPlan(_Section, frozen=True):
 
     @model_validator(mode="after")
     def _ranges_ascend(self) -> "PourPlan":
+        fastest = self.angular_velocity_deg_s[1]
+        if fastest <= 2.0 * np.pi:
+            raise ValueError(
+                f"angular_velocity_deg_s ends at {fastest:g} deg/s, a pour of half a minute; give "
+                "deg/s, no rad/s"
+            )
         for name in ("angular_velocity_deg_s", "distance"):
             low, high = getattr(self, name)
             if not low < high:

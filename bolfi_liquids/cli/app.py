@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
-from ..guide import PAGES, read_page
+from ..guide import PAGES, for_terminal
 from ..inputs.settings import CalibrationSettings, CriticismSettings, PourSettings, SbcSettings
 from ..wording import command
 from . import import_table, printed
@@ -288,9 +288,8 @@ def guide(
         typer.echo("read one: bolfi-liquids guide PAGE")
         return
     from rich.console import Console
-    from rich.markdown import Markdown
 
-    Console().print(Markdown(read_page(page), hyperlinks=False))
+    Console().print(for_terminal(page))
 
 
 app.add_typer(cli_simulate.app, name="simulate")

@@ -1,8 +1,13 @@
 """Pages for the person at the keyboard, in Markdown; `bolfi-liquids guide` prints them."""
 
+from collections.abc import Iterator
 from importlib.resources import files
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
+
+if TYPE_CHECKING:
+    from rich.markdown import Markdown
 
 PAGES = {
     "recordings": "the recording format, import, resuming, what a run holds",
@@ -28,3 +33,24 @@ def read_page(name: str) -> str:
     if name not in PAGES:
         raise InputError(f"no page {name!r}", where="guide", fix=f"choose {', '.join(PAGES)}")
     return (files(__name__) / f"{name}.md").read_text(encoding="utf-8")
+
+
+def for_terminal(name: str) -> "Markdown":
+    """A page as rich prints it, with folded cells of tables: no name of a field is cut.
+
+    Raises:
+        InputError: There is no such page.
+    """
+    from rich.markdown import Markdown, TableElement
+
+    class Folded(TableElement):
+        def __rich_console__(self, *where: Any) -> Iterator[Any]:
+            for table in super().__rich_console__(*where):
+                for column in table.columns:
+                    column.overflow = "fold"
+                yield table
+
+    class Page(Markdown):
+        elements = {**Markdown.elements, "table_open": Folded}  # noqa: RUF012  as its base has it
+
+    return Page(read_page(name), hyperlinks=False)

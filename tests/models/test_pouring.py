@@ -26,6 +26,7 @@ def test_bad_actions_are_named(cups):
         ("hold = 0.9 ", "hold = 'long' ", r"pour\.hold.*long"),
         ("lip_height = 0.20", "lip_height = 0.05", "lip.*not above the receiver's rim"),
         ("[0.0, 0.07]", "[0.07, 0.0]", "distance must ascend"),
+        ("[30.0, 180.0]", "[1.0, 3.14]", r"angular_velocity_deg_s.*3\.14.*no rad/s"),
         ("[0.0, 0.07]", "[-50.0, 0.07]", "0.5 m, got -50"),
         ("radius = 0.028", "radius = inf", r"source\.radius.*inf"),
         ("radius = 0.028", "radius = 0.56", r"source\.radius.*0.25 m, got 0.56"),

@@ -166,6 +166,11 @@ def test_pages_are_installed_and_printed():
         assert max(map(len, result.stdout.splitlines())) <= 80, page
 
 
+def test_no_field_of_a_table_is_cut():
+    result = CliRunner().invoke(app, ["guide", "files"], env={"COLUMNS": "80"})
+    assert "…" not in result.stdout
+
+
 def test_without_a_name_the_pages_are_listed():
     result = CliRunner().invoke(app, ["guide"])
     assert result.exit_code == 0
