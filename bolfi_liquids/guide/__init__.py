@@ -1,6 +1,6 @@
 """Pages for the person at the keyboard, in Markdown; `bolfi-liquids guide` prints them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +45,8 @@ def for_terminal(name: str) -> "Markdown":
 
     class Folded(TableElement):
         def __rich_console__(self, *where: Any) -> Iterator[Any]:
-            for table in super().__rich_console__(*where):
+            tables: Iterable[Any] = super().__rich_console__(*where)
+            for table in tables:
                 for column in table.columns:
                     column.overflow = "fold"
                 yield table
