@@ -129,13 +129,17 @@ class PourPlan(_Section, frozen=True):
         return float(np.radians(self.final_angle_deg))
 
     @model_validator(mode="after")
-    def _ranges_ascend(self) -> "PourPlan":
+    def _turns_in_degrees(self) -> "PourPlan":
         fastest = self.angular_velocity_deg_s[1]
         if fastest <= 2.0 * np.pi:
             raise ValueError(
                 f"angular_velocity_deg_s ends at {fastest:g} deg/s, a pour of half a minute; give "
                 "deg/s, no rad/s"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _ranges_ascend(self) -> "PourPlan":
         for name in ("angular_velocity_deg_s", "distance"):
             low, high = getattr(self, name)
             if not low < high:

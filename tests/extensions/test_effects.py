@@ -3,17 +3,16 @@
 `pytest tests/extensions --effect your_module:EFFECT` adds the last to each test.
 """
 
-from importlib.resources import files
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import xarray as xr
 from bolfi_liquids.inference.distributions import Univariate
 from bolfi_liquids.models import effects as registry
 from jax import random
 
 from bolfi_liquids import models
+from bolfi_liquids.inputs.bundled import bundled_recording
 
 from .named import named
 from .wind import EFFECT as WIND
@@ -52,17 +51,11 @@ def effect(request):
 @pytest.fixture
 def stir():
     """Stirs glycerin with a few particles for a third of a second."""
-    data = xr.load_dataset(files("bolfi_liquids.data") / "glycerin_v10.nc", decode_times=False)
-    position = np.stack([data.x, data.y, data.z], axis=1)
-    gripper = SimpleNamespace(time=data.time.values, position=position)
-    recording = SimpleNamespace(
-        attrs=data.attrs,
-        gripper=gripper,
-        inclination=np.stack([data.inclination_xz, data.inclination_yz], axis=1),
-    )
+    recording = bundled_recording("glycerin")
+    gripper = recording.gripper
     setup = models.StirSetup.from_recording(recording, particles=150)
     moving = (gripper.time > 0.5) & (gripper.time < 0.8)
-    short = SimpleNamespace(time=gripper.time[moving], position=position[moving])
+    short = SimpleNamespace(time=gripper.time[moving], position=gripper.position[moving])
 
     def run(effects=None, part=slice(None)):
         return models.stir(LIQUID, short, setup, SEEDS[part], effects)
