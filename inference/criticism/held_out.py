@@ -9,6 +9,7 @@ import numpy as np
 from .._float64 import in_float64
 from ..surrogates.output_vectors import MIN_LONG
 from .experiment import Experiment, Proposal
+from .hypothesis import log_densities, sized_covariances
 from .measurement_noise import Noise, gaussian, samples
 from .misfit import ACCEPTANCE_LEVEL, exceedance, judged_modes, orthonormal
 from .run_noise import errors_of, smooth_covariance
@@ -30,8 +31,8 @@ class Gap(NamedTuple):
         noise: RMS that measurement and the simulator's own noise would leave of a right model.
         model_error: RMS of the simulator's usual error besides.
         floor: RMS that these exceed once in a hundred times.
-        p_value: Of what is left after, by its RMS and by its slow part (Bonferroni), all noise
-            and the model error considered.
+        p_before, p_value: Of what is left before and after, by its RMS and by its slow part
+            (Bonferroni), all noise and the model error considered.
         lpd_gain: Log predictive density after less before.
     """
 
@@ -41,6 +42,7 @@ class Gap(NamedTuple):
     noise: float
     model_error: float
     floor: float
+    p_before: float
     p_value: float
     lpd_gain: float
 
@@ -79,7 +81,7 @@ def holds(gaps: Sequence[Gap]) -> bool:
     """Whether an explanation holds on held-out data.
 
     It leaves no more than noise and the model error on each of them, predicts better on all of
-    them together, and explains most of the gap there.
+    them together, and explains most of the gap there. Where there was no gap, nothing was proved.
 
     The model error is taken off the gap, and a wrong explanation cannot hide behind it: it must
     predict better, and what it leaves must look like the model error.
@@ -88,6 +90,7 @@ def holds(gaps: Sequence[Gap]) -> bool:
         return True
     before, after = np.sqrt(np.mean(np.square([one.unexplained for one in gaps]), axis=0))
     explained = after <= MAX_LEFT_SHARE * before or all(one.after <= one.floor for one in gaps)
+    explained &= before > 0.0
     gained = sum(one.lpd_gain for one in gaps) > MIN_LPD_GAIN
     return bool(all(one.fits for one in gaps) and explained and gained)
 
@@ -112,22 +115,24 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
         slow = np.sum((span.T @ np.linalg.solve(factor, rows.T)) ** 2, axis=0)
         return np.stack([np.mean(rows**2, axis=1), slow])
 
-    def density(mean: np.ndarray) -> float:
-        return -0.5 * float(np.sum(np.linalg.solve(factor, observed - mean) ** 2))
-
-    means = before.mean(0), after.mean(0)
-    left = measures((observed - means[1])[None])[:, 0]
-    sizes = [float(np.sqrt(np.mean((observed - mean) ** 2))) for mean in means]
+    usual = measures(null)
+    means = np.stack([before.mean(0), after.mean(0)])
+    left = measures(observed - means)
+    p_values = [min(1.0, 2.0 * float(exceedance(usual, seen).min())) for seen in left.T]
+    covariances, log_weight = sized_covariances(experiment.noise, at)
+    density = log_densities(observed - means, [simulated + one for one in covariances], log_weight)
+    sizes = np.sqrt(np.mean((observed - means) ** 2, axis=1))
     known = np.trace(experiment.measurement.covariance(at) + simulated) / len(observed)
     return Gap(
         label=experiment.label,
-        before=sizes[0],
-        after=sizes[1],
+        before=float(sizes[0]),
+        after=float(sizes[1]),
         noise=float(np.sqrt(known)),
         model_error=experiment.model_error_rms,
         floor=float(np.quantile(np.sqrt(np.mean(noise**2, axis=1)), NOISE_QUANTILE)),
-        p_value=min(1.0, 2.0 * float(exceedance(measures(null), left).min())),
-        lpd_gain=density(means[1]) - density(means[0]),
+        p_before=p_values[0],
+        p_value=p_values[1],
+        lpd_gain=float(density[1] - density[0]),
     )
 
 

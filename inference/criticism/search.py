@@ -21,7 +21,6 @@ FULL_PASS = 8  # runs of a pass of refits, at least: fewer passes, and fuller ca
 MAX_DOUBT = 1.0  # of a settled fit: emulator's variance over all variance, summed over the data
 SIDE_SHARES = (0.7, 0.35)  # of the prior quantiles from neutral to an end: where effects are tried
 LOOK = "look"  # phase of the first runs of effects where they seem to fit best
-SECOND_EFFECT_GAIN = 6.0  # log likelihood that a second effect must gain
 CLEAN_PASSES = 2  # of runs where the model fits clean data best: so far, and with the first's runs
 CLEAN_RUNS = 2  # of each; the mean of the last is free of the emulator's error
 
@@ -182,14 +181,11 @@ def own_residual(
 
 def explain(
     study: Study, base: Base, accept: Sequence[str] | None = None
-) -> tuple[list[Candidate], list[Candidate]]:
+) -> list[Candidate]:
     """Fit every explanation by one effect, and pairs of effects where no single one suffices.
 
     Args:
         accept: Effects that are refitted together, whatever their rank.
-
-    Returns:
-        All explanations, and the accepted ones.
 
     Raises:
         AllRunsFailed: an effect to be accepted cannot be simulated.
@@ -209,10 +205,9 @@ def explain(
     search.refit(near_best(search.singles, plan.refits))
     if not any(one.accepted for one in search.singles):
         search.try_pairs()
-    accepted = [one for one in search.found.values() if one.accepted]  # whatever is forced
     if forced:
         search.force(forced)
-    return list(search.found.values()), [one for one in accepted if len(one.names) == 1] or accepted
+    return list(search.found.values())
 
 
 class Search:
@@ -231,10 +226,10 @@ class Search:
 
     def candidate(self, hypothesis: Hypothesis, refitted: bool = False) -> Candidate:
         """The extended model, tested."""
-        metric = self.base.hypothesis
-        gain = 0.5 * (metric.misfit(metric) - hypothesis.misfit(metric))
+        base = self.base.hypothesis
         tested, _ = self.study.check(hypothesis, self.base.signatures)
-        return Candidate(hypothesis, tested, gain, refitted)
+        occam = hypothesis.log_volume - base.log_volume
+        return Candidate(hypothesis, tested, hypothesis.gain(base), occam, refitted)
 
     def visit(
         self, phase: str, candidates: Sequence[Candidate], count: int
@@ -305,8 +300,8 @@ class Search:
         return self.candidate(self.study.hypothesis(names, self.runs, box.extended(len(names))))
 
     def try_pairs(self) -> None:
-        """Fit the best effect with those that its residual seems to need most; a pair counts if
-        it gains more than either alone. Single effects of an accepted pair are refitted."""
+        """Fit the best effect with those that its residual seems to need most. Single effects of an
+        accepted pair are refitted."""
         if not self.found:  # no effect could be simulated
             return
         self.counted = len(self.runs)
@@ -326,7 +321,3 @@ class Search:
         named = dict.fromkeys(name for one in tried if one.accepted for name in one.names)
         alone = [self.found[(name,)] for name in named]
         self.refit([one for one in alone if not one.refitted])
-        for one in tried:
-            best_alone = max(self.found[(name,)].gain for name in one.names)
-            needed = one.gain > best_alone + SECOND_EFFECT_GAIN
-            self.found[one.names] = replace(one, needed=needed)
