@@ -18,6 +18,7 @@ from .experiment import Experiment, Extensions, Proposal, check_extensions
 from .held_out import Gap, Suggestion, gap, holds, suggest
 from .hypothesis import Hypothesis, Interval, Weighted, weighted_posterior
 from .misfit import Found, confusion, locate, null_draws
+from .power import Sensitivity, sensitivity
 from .search import Base, Search, examine, explain
 from .study import AllRunsFailed, Plan, Report, Study, silent
 from .verdict import (
@@ -51,6 +52,8 @@ class Criticism(Displayed):
         experiment: The data, their noise and the simulator.
         units: Of the effects' coefficients.
         tied: Names of each explanation that remains, best first.
+        sensitivities: Of each effect that was simulated: which sizes the data would show, and which
+            they may hide.
         probabilities: Of "none", of each explanation that was fitted, and of "none of these"; see
             `verdict`.
         simulations: Runs that were asked for, those found in the bank included.
@@ -70,6 +73,7 @@ class Criticism(Displayed):
     units: Mapping[str, str]
     tied: tuple[tuple[str, ...], ...]
     probabilities: Mapping[str, float]
+    sensitivities: Mapping[str, Sensitivity]
     simulations: int
 
     def _shown(self) -> list[tuple[str, str]]:
@@ -125,6 +129,13 @@ class Criticism(Displayed):
         """The accepted explanation, or the best of those that are tied."""
         tied = self.tied[0] if self.verdict.kind is VerdictKind.TIE else None
         return _among(self.candidates, self.accepted) or _among(self.candidates, tied)
+
+    @property
+    def isolability(self) -> np.ndarray:
+        """Signal-to-noise ratio of each effect, of its typical size, that no size of the other
+        effect absorbs [e, e]; below about 3 the data do not tell the two apart."""
+        snr = np.array([of.snr for of in self.base.signatures.values()])
+        return snr[:, None] * np.sqrt(np.maximum(1.0 - self.confusion**2, 0.0))
 
     @property
     def confusion(self) -> np.ndarray:
@@ -249,6 +260,10 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         units={name: one.unit for name, one in extensions.items()},
         tied=tuple(one.names for one in members),
         probabilities=probability,
+        sensitivities={
+            name: sensitivity(base.hypothesis, single, extensions[name], len(extensions))
+            for name, single in base.singles.items()
+        },
         simulations=count,
     )
 

@@ -179,9 +179,7 @@ def own_residual(
     return OwnResidual(experiment.observed - runs[-1].signals.mean(0) - moved, fitted.best)
 
 
-def explain(
-    study: Study, base: Base, accept: Sequence[str] | None = None
-) -> list[Candidate]:
+def explain(study: Study, base: Base, accept: Sequence[str] | None = None) -> list[Candidate]:
     """Fit every explanation by one effect, and pairs of effects where no single one suffices.
 
     Args:

@@ -178,9 +178,7 @@ def credible(probability: Mapping[str, float]) -> list[str]:
     return ordered[: 1 + int(np.searchsorted(reached, CREDIBLE - 1e-12))]
 
 
-def remaining(
-    probability: Mapping[str, float], candidates: Sequence[Candidate]
-) -> list[Candidate]:
+def remaining(probability: Mapping[str, float], candidates: Sequence[Candidate]) -> list[Candidate]:
     """The explanations among the credible ones, best first; none where the model may lack nothing
     or something else."""
     found = credible(probability)
