@@ -230,7 +230,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         candidates: list[Candidate] = []
         if accept is not None or base.check.p_value < level:
             candidates = _explanations(study, base, accept, held_out)
-        fitted = candidates or list(Search(study, base).found.values())
+        # where nothing was looked for, the first fits say how probable each effect is
+        fitted = candidates or [replace(one, refitted=True) for one in Search(study, base).singles]
         probability = probabilities(base.check, fitted, len(extensions))
         verdict = conclude(base.check, candidates, probability, level)
         members = remaining(probability, candidates)

@@ -81,7 +81,7 @@ def holds(gaps: Sequence[Gap]) -> bool:
     """Whether an explanation holds on held-out data.
 
     It leaves no more than noise and the model error on each of them, predicts better on all of
-    them together, and explains most of the gap there. Where there was no gap, nothing was proved.
+    them together, and explains most of the gap there.
 
     The model error is taken off the gap, and a wrong explanation cannot hide behind it: it must
     predict better, and what it leaves must look like the model error.
@@ -90,7 +90,6 @@ def holds(gaps: Sequence[Gap]) -> bool:
         return True
     before, after = np.sqrt(np.mean(np.square([one.unexplained for one in gaps]), axis=0))
     explained = after <= MAX_LEFT_SHARE * before or all(one.after <= one.floor for one in gaps)
-    explained &= before > 0.0
     gained = sum(one.lpd_gain for one in gaps) > MIN_LPD_GAIN
     return bool(all(one.fits for one in gaps) and explained and gained)
 

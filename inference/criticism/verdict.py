@@ -8,8 +8,8 @@ explanations are wrong if something else is missing. Then the p-value of the bes
 the distribution Beta(`WRONG_P`, 1) of Sellke, Bayarri and Berger (2001), and is uniform under the
 right one.
 
-The conclusion is the smallest set of explanations that holds the right one with the probability
-`CREDIBLE`: to miss it costs as much as nine needless names.
+A conclusion costs as much as the number of explanations that it leaves, and may miss the right one
+with the probability 1 - `CREDIBLE`: so it is the smallest set that holds it with that probability.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,14 +20,13 @@ import numpy as np
 from .held_out import Gap, holds
 from .hypothesis import Hypothesis
 from .misfit import ACCEPTANCE_LEVEL, REPLICATES, Check
-from .verdict_kind import VerdictKind
+from .verdict_kind import CERTAIN, VerdictKind
 
 REJECTION_LEVEL = 0.05  # p-value below which explanations are looked for
 MIN_GAIN = 2.0  # log likelihood below which an effect explains nothing
 FAR_BEHIND = 0.5  # of the best gain, below which one that does not pass is not worth more runs
 TIE_MARGIN = 4.0  # log likelihood by which one explanation must excel another
 CREDIBLE = 0.9  # probability that the right explanation is among those that are named
-CERTAIN = 0.95  # probability from which a name needs no "probably"
 WRONG_P = 0.01  # so that a p-value of 0.01 is as probable under a right and a wrong explanation
 NONE, OTHER = "none", "none of these"
 
@@ -180,12 +179,19 @@ def credible(probability: Mapping[str, float]) -> list[str]:
 
 def remaining(probability: Mapping[str, float], candidates: Sequence[Candidate]) -> list[Candidate]:
     """The explanations among the credible ones, best first; none where the model may lack nothing
-    or something else."""
+    or something else.
+
+    Where the held-out data show no gap they confirm nothing, and none is left alone.
+    """
     found = credible(probability)
-    if NONE in found or OTHER in found:
+    accepted = [one for one in candidates if one.accepted]
+    if not accepted or NONE in found or OTHER in found:
         return []
-    by_label = {label(one.names): one for one in candidates}
-    return [by_label[name] for name in found]
+    ranked = sorted(accepted, key=lambda one: -probability[label(one.names)])
+    gaps = ranked[0].gaps
+    confirmed = not gaps or any(gap.unexplained[0] > 0.0 for gap in gaps)
+    count = max(len(found), 1 if confirmed else 2)
+    return ranked[:count] if len(ranked) >= count else []
 
 
 def conclude(
