@@ -28,6 +28,7 @@ FAR_BEHIND = 0.5  # of the best gain, below which one that does not pass is not 
 TIE_MARGIN = 4.0  # log likelihood by which one explanation must excel another
 CREDIBLE = 0.9  # probability that the right explanation is among those that are named
 WRONG_P = 0.01  # so that a p-value of 0.01 is as probable under a right and a wrong explanation
+P_VALUE_STEP = 3.0 / (REPLICATES + 1.0)  # the smallest of a test that looks at two statistics
 NONE, OTHER = "none", "none of these"
 
 
@@ -157,9 +158,8 @@ def probabilities(base: Check, candidates: Sequence[Candidate], effects: int) ->
 
 def _fit_ratio(p_values: Sequence[float]) -> float:
     """Probability of the smallest of several p-values if an explanation is right, over that if it
-    is wrong; both are of a whole step of the bootstrap, since smaller p-values are not told
-    apart."""
-    step = len(p_values) / (REPLICATES + 1.0)
+    is wrong; both are of a whole step, since the bootstrap does not tell smaller ones apart."""
+    step = P_VALUE_STEP * len(p_values)
     p = float(np.clip(len(p_values) * min(p_values), step, 1.0))
     return step / (p**WRONG_P - max(p - step, 0.0) ** WRONG_P)
 
