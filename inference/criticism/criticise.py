@@ -330,15 +330,21 @@ def _gaps(
         for model, made in zip(models[1:], after, strict=True):
             if not len(made):
                 failed.setdefault(model.names, made.error)
-        gaps = {
-            model.names: (
-                *gaps[model.names],
-                gap(one, before.signals[:, there], made.signals[:, there], seed),
-            )
+        neutral = before.signals[:, there]
+        acting = {
+            model.names: made.signals[:, there]
             for model, made in zip(models[1:], after, strict=True)
             if model.names not in failed
         }
+        gaps = {
+            names: (*gaps[names], gap(one, neutral, made, seed, _without(acting, names)))
+            for names, made in acting.items()
+        }
     return gaps, failed
+
+
+def _without(acting: Mapping[tuple[str, ...], np.ndarray], names: tuple[str, ...]) -> list:
+    return [made for other, made in acting.items() if other != names]
 
 
 def _check_others(name: str, given: Any, kind: type) -> None:
