@@ -62,6 +62,7 @@ class Candidate:
         occam: Log of the share of the coefficients' prior that explains the data as well.
         refitted: Whether runs near its best parameters were made for it; what was not is not
             accepted.
+        requested: Whether it was refitted only because the user accepts it: it changes no verdict.
         gaps: On the held-out data, where it was compared with them.
         unpredicted: Why it could not be simulated for held-out data; "" where it could.
     """
@@ -71,6 +72,7 @@ class Candidate:
     gain: float
     occam: float = 0.0
     refitted: bool = False
+    requested: bool = False
     gaps: tuple[Gap, ...] = ()
     unpredicted: str = ""
 
@@ -82,6 +84,11 @@ class Candidate:
     def held(self) -> bool:
         """Whether it held on the held-out data, where there were any."""
         return not self.unpredicted and holds(self.gaps)
+
+    @property
+    def seen(self) -> bool:
+        """Whether held-out data, if there were any, show a gap that it could explain."""
+        return not self.gaps or any(gap.unexplained[0] > 0.0 for gap in self.gaps)
 
     @property
     def evidence(self) -> float:
@@ -191,9 +198,7 @@ def remaining(probability: Mapping[str, float], candidates: Sequence[Candidate])
     if not accepted or NONE in found or OTHER in found:
         return []
     ranked = sorted(accepted, key=lambda one: -probability[label(one.names)])
-    gaps = ranked[0].gaps
-    confirmed = not gaps or any(gap.unexplained[0] > 0.0 for gap in gaps)
-    count = max(len(found), 1 if confirmed else 2)
+    count = max(len(found), 1 if ranked[0].seen else 2)
     return ranked[:count] if len(ranked) >= count else []
 
 
@@ -224,6 +229,9 @@ def conclude(
 
 
 def _unexplained(explanations: Sequence[Candidate]) -> str:
+    unseen = [label(one.names) for one in explanations if one.accepted and not one.seen]
+    if unseen:
+        return f"{unseen[0]} may explain it, but held-out data show no gap that would confirm it."
     refuted = [label(one.names) for one in explanations if one.passes and not one.held]
     if not refuted:
         return "no known effect explains it."
