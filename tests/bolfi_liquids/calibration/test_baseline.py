@@ -1,6 +1,7 @@
 """What clean recordings show of the simulator's error is learned once, and taken from its file."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import bolfi_liquids as bl
 from bolfi_liquids.calibration.baseline import open_clean, parts_of, recording_of
 from bolfi_liquids.calibration.model_error import CLEAN_RUNS, Clean, clean_residuals
 from bolfi_liquids.criticism.inputs import open_inputs
+from bolfi_liquids.guide import read_page
 from bolfi_liquids.inputs.settings import CriticismSettings
 from bolfi_liquids.run.results import read_result, write_result
 
@@ -80,6 +82,18 @@ def test_clean_recordings_are_known_from_a_baseline_or_learned(calibration, clea
     inputs = open_inputs(calibration, CriticismSettings(), held_out, given[1:])
     assert [recording_of(one).path.name for one in inputs.clean] == ["a.nc"]
     assert inputs.left_out == ("b.nc",)
+
+
+def test_the_guide_names_every_variable(baseline):
+    listed = read_page("files").split("\n## A baseline\n", 1)[1].split("\n## ", 1)[0]
+    group = read_result(baseline.path)["clean_1"].to_dataset()
+    for name in ("@made_from", "clean_1@file", "clean_1@sha256"):
+        assert f"`{name}`" in listed
+    for name, variable in group.variables.items():
+        dims = f" ({', '.join(variable.dims)})" if variable.dims else ""
+        unit = f" [{variable.attrs['units']}]" if "units" in variable.attrs else ""
+        told = rf"^- `clean_1/(?:\{{.*)?{name}(?:.*\}})?`{re.escape(dims + unit)}: "
+        assert re.search(told, listed, re.M), name
 
 
 def changed(baseline, path, **fields):
