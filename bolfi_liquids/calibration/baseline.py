@@ -207,9 +207,9 @@ def parts_of(
             continue
         if one.particles != particles:
             raise InputError(
-                f"was made with `particles` = {one.particles}, but the run with {particles}",
+                f"was made with particles = {one.particles}, but the run with {particles}",
                 where=Argument(f"baseline {one.path}"),
-                fix="make a baseline with those of the run, or give its recordings",
+                fix=f"make one with --particles {particles}, or give its recordings",
             )
         parts |= {part.recording.hash: part for part in one.clean}
     digests = {one.hash for one in used}

@@ -1,6 +1,7 @@
 """What clean recordings show of the simulator's error is learned once, and taken from its file."""
 
 import json
+import math
 import re
 
 import numpy as np
@@ -8,14 +9,17 @@ import pytest
 import xarray as xr
 from bolfi_liquids.inference import SimulationBank
 from bolfi_liquids.inference.simulations import Compute
+from typer.testing import CliRunner
 
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.baseline import open_clean, parts_of, recording_of
 from bolfi_liquids.calibration.model_error import CLEAN_RUNS, Clean, clean_residuals
+from bolfi_liquids.cli.app import app
 from bolfi_liquids.criticism.inputs import open_inputs
 from bolfi_liquids.guide import read_page
 from bolfi_liquids.inputs.settings import CriticismSettings
 from bolfi_liquids.run.results import read_result, write_result
+from bolfi_liquids.wording import degrees
 
 PARTICLES = 200  # as the run of `calibration`
 
@@ -67,6 +71,16 @@ def test_what_was_simulated_for_a_baseline_is_not_simulated_again(clean, tmp_pat
     both = bl.learn_baseline(clean, out=out, **how)
     assert bank_of(both) == 2 * CLEAN_RUNS
     np.testing.assert_array_equal(both.clean[0].residual, first.clean[0].residual)
+
+
+def test_the_command_tells_the_error_of_each_recording(clean, baseline):
+    typed = ["baseline", *map(str, clean), "--out", str(baseline.path), "--particles"]
+    result = CliRunner().invoke(app, [*typed, str(PARTICLES)])
+    assert result.exit_code == 0
+    for one in baseline.clean:
+        assert one.recording.path.name in result.stdout
+        assert degrees(math.degrees(one.error)) in result.stdout
+    assert str(baseline.path) in result.stdout.replace("\n", "")
 
 
 def test_clean_recordings_are_known_from_a_baseline_or_learned(calibration, clean, baseline):
