@@ -1,3 +1,5 @@
+from .calibration.baseline import Baseline as Baseline
+from .calibration.baseline import learn_baseline as learn_baseline
 from .calibration.calibrate import calibrate as calibrate
 from .calibration.result import Calibration as Calibration
 from .criticism.criticise import criticise as criticise

@@ -30,6 +30,7 @@ from ..run.results import generations, versions
 from ..run.run import RUN_TOML, Run
 from ..run.simulations import warn_of_failures
 from ..simulators import StirSimulator, stir_simulator
+from .baseline import Baseline, CleanSource, Part, open_clean, parts_of, recording_of
 from .engine_fit import (
     PREDICTIVE_DRAWS,
     THETA_STAR_REPLICATES,
@@ -61,7 +62,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     *,
     out: str | Path | None = None,
     prior: "Prior | None" = None,
-    baseline: Source | Sequence[Source] = (),
+    baseline: CleanSource | Sequence[CleanSource] = (),
     pours: Pours | None = None,
     cups: "Cups | str | Path | None" = None,
     budget: int = 20,
@@ -91,7 +92,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         prior: Over `viscosity` [Pa s] and `cohesion` [1]; None is `default_prior()`.
         baseline: Clean recordings of the same rig, of any liquid, in which no effect is believed
             to be missing: the simulator's error is learned from them, at eight more simulations
-            each. Without them it is the usual one, see `model_error.model_error`.
+            each, or from the file of `learn_baseline`. Without them it is the one that is known,
+            see `models.stirring_error`.
         pours: A table of pours of the liquid that were made, or its path: the posterior does not
             depend on it, but `choose_pour` does.
         cups: With which they were made, or a TOML file of them; None takes the bundled ones.
@@ -133,12 +135,12 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     if prior is not None:
         check_prior(prior)
     stirring = stir_simulator(opened, settings.particles)
-    clean = _open_clean(baseline, stirring, surrogate)
+    given, clean = _open_clean(baseline, stirring, settings)
     path = (
         Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
     )
     prior = _usual_prior(path, resume) if prior is None else prior
-    record = run_record(settings, prior, stirring, clean)
+    record = run_record(settings, prior, stirring, given)
     with (
         open_compute(executor, timeout) as compute,
         Run.begun(path, record, resume=resume, growing="settings.budget") as run,
@@ -158,10 +160,10 @@ def run_record(
     settings: CalibrationSettings,
     prior: "Prior",
     stirring: StirSimulator,
-    clean: Sequence[Recording] = (),
+    given: Sequence[Recording | Baseline] = (),
 ) -> dict[str, Any]:
     """Content of run.toml: settings, inputs, versions; see `run.run.MUST_AGREE`."""
-    baseline = {"baseline": [recording.hash for recording in clean]} if clean else {}
+    baseline = {"baseline": [one.hash for one in given]} if given else {}
     return {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "settings": asdict(settings) | {"prior": describe_prior(prior)},
@@ -177,12 +179,14 @@ def _calibrate(
     run: Run,
     settings: CalibrationSettings,
     stirring: StirSimulator,
-    clean: Sequence[Recording],
+    clean: Sequence[Part],
     compute: "Compute",
     progress: bool,
 ) -> None:
     """Search, confirm, judge, and keep the result in the run."""
-    needed = settings.budget + CLEAN_RUNS * len(clean) + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
+    unknown = [one for one in clean if isinstance(one, Recording)]
+    needed = settings.budget + CLEAN_RUNS * len(unknown)
+    needed += PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
     with run.bank() as bank, ExitStack() as stack:
         kept = min(len(bank), needed)
         # more are made where the first that confirm the posterior move it
@@ -222,7 +226,7 @@ def _calibrate(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )
         tree = results_tree(sampled, fit, stirring, settings.seed, compute, advance)
-    names = tuple(one.path.name for one in clean)
+    names = tuple(recording_of(one).path.name for one in clean)
     summary = CalibrationSummary.from_fit(tree, fit, stirring, settings.budget, error, names)
     run.keep("calibrate", tree, run.made_from, summary.to_json())
 
@@ -252,21 +256,27 @@ def _open_all(recordings: Source | Sequence[Source]) -> list[Recording]:
 
 
 def _open_clean(
-    baseline: Source | Sequence[Source], stirring: StirSimulator, surrogate: str
-) -> list[Recording]:
-    """Clean recordings beside which a run's can be calibrated.
+    baseline: CleanSource | Sequence[CleanSource],
+    stirring: StirSimulator,
+    settings: CalibrationSettings,
+) -> tuple[list[Recording | Baseline], list[Part]]:
+    """What was given as clean, and the recordings in it beside which a run's can be calibrated.
 
     Raises:
         InputError: They cannot be used.
     """
-    clean = open_recordings(baseline, Argument("baseline"))
-    if clean and surrogate != "signal":
+    given = open_clean(baseline)
+    if given and settings.surrogate != "signal":
         raise InputError(
-            f"clean recordings, but the surrogate {surrogate!r} does not allow for an error",
+            f"clean recordings, but the surrogate {settings.surrogate!r} allows for no error",
             where=Argument("baseline"),
             fix="leave them out, or take the surrogate 'signal'",
         )
-    check_beside(stirring, clean, "baseline")
-    for recording in clean:
+    alone = [one for one in given if isinstance(one, Recording)]
+    check_beside(stirring, alone, "baseline")
+    for recording in alone:
         camera_noise([recording])  # refuses one that rests too shortly
-    return clean
+    # the file of a rig may hold what is calibrated
+    clean, _ = parts_of(given, stirring.recordings, settings.particles)
+    check_beside(stirring, list(map(recording_of, clean)), "baseline")
+    return given, clean

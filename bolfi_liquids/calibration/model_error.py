@@ -1,4 +1,4 @@
-"""The simulator's own error: the usual one, or what it leaves on clean recordings."""
+"""The simulator's own error: what is known of it, and what it leaves on clean recordings."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,14 +15,15 @@ from .stirs import (
     camera_noise,
     effects_of,
     frame_interval,
+    rms,
     same_experiment,
     same_rate,
     sensor_noise,
     stir_experiment,
 )
+from .summary import unexplained
 
 if TYPE_CHECKING:
-    from .. import inference
     from ..inference import Prior
     from ..inference.criticism import ModelError, Report, SumOfNoises
     from ..inference.simulations import Compute
@@ -38,10 +39,14 @@ SIZE_TOLERANCE = 0.02
 """Relative difference up to which two sizes are the same."""
 
 SHORT_PART = 0.5
-"""Size of the part of the usual error that is forgotten soon, over that of the other."""
+"""Size of the part of the known error that is forgotten soon, over that of the other."""
 
 SHORT_TIME = 0.1
 """Time over which it is forgotten [s]."""
+
+KNOWN_FREEDOM = 5.0
+"""Clean recordings that the known error counts as. In the reference's recordings the simulator errs
+by 0.5 to 1.6 times as much, or by nothing: as well is a size known from five numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,24 +56,29 @@ class Clean:
     Attributes:
         recording: The recording.
         residual: Recorded less expected [rad], shape (T, 2), NaN where missing.
-        viscosity: Most probable [Pa s]; None where the prior has none.
-        simulations: Made to learn that.
+        viscosity: Most probable [Pa s].
+        simulations: Made to learn that; 0 where it was known.
     """
 
     recording: Recording
     residual: NDArray[np.float64]
-    viscosity: float | None
+    viscosity: float
     simulations: int
+
+    @property
+    def error(self) -> float:
+        """RMS of the residual beyond the cameras' noise [rad]."""
+        return unexplained(rms(self.residual), sensor_noise(self.recording.inclination))
 
 
 def clean_residuals(
-    recordings: Sequence[Recording],
+    recordings: "Sequence[Recording | Clean]",
     particles: int,
     prior: "Prior",
     compute: "Compute",
     report: "Report",
 ) -> list[Clean]:
-    """Calibrate the simulator on each of them in turn.
+    """Calibrate the simulator on each of them in turn, where that was not done before.
 
     Args:
         recordings: Clean ones.
@@ -96,9 +106,9 @@ def clean_residuals(
         left = own_residual(
             experiment, prior, effects_of("stir"), compute, report=counted, start=STARTING_RUNS
         )
-        return Clean(recording, left.residual, left.best.get("viscosity"), sum(made))
+        return Clean(recording, left.residual, left.best["viscosity"], sum(made))
 
-    return [learn(recording) for recording in recordings]
+    return [one if isinstance(one, Clean) else learn(one) for one in recordings]
 
 
 def check_beside(stirring: StirSimulator, recordings: Sequence[Recording], option: str) -> None:
@@ -144,95 +154,86 @@ def _faults(
     for name in RIG_SIZES:
         there, here = recording.number(name), first.number(name)
         if abs(there - here) > SIZE_TOLERANCE * abs(here):
-            yield f"{name} is {there:g}, but {here:g} in the run", "give recordings of the same rig"
+            what = f"{name} is {there:g}, but {here:g} in {first.path.name}"
+            yield what, "give recordings of the same rig"
     if option == "held_out" and not same_liquid(recording, first):
         there, here = (one.number("liquid_density") for one in (recording, first))
         yield (
-            f"liquid_density is {there:g} kg/m3, but {here:g} in the run",
+            f"liquid_density is {there:g} kg/m3, but {here:g} in {first.path.name}",
             "hold out a recording of the same liquid",
         )
     if option == "baseline" and not same_rate(recording, first):
         there, here = (1.0 / frame_interval(one) for one in (recording, first))
         yield (
-            f"has {there:.3g} samples a second, but the run's recording {here:.3g}",
+            f"has {there:.3g} samples a second, but {first.path.name} {here:.3g}",
             "give recordings of the same frame rate",
         )
 
 
-def usual_for(
+def model_error(
     stirring: StirSimulator,
-    clean: Sequence[Clean],
-    viscosity: float | None,
+    viscosity: float,
+    clean: Sequence[Clean] = (),
     *,
     elsewhere: bool = False,
-) -> "inference.criticism.ModelError | None":
-    """Usual error of the simulator at a viscosity [Pa s]; None without clean recordings.
+) -> "ModelError":
+    """The simulator's error on a run's recordings, in a liquid of so many Pa s.
+
+    Clean recordings show which multiple of the known error it makes, and those nearest in viscosity
+    count most. One of the same path and of a liquid like this one shows where on it, too.
 
     Args:
         stirring: The simulator, and what was recorded.
-        clean: One of the same path, of a liquid like this one, shows where on it the simulator
-            errs.
-        viscosity: None where it is not known.
+        viscosity: Of the model that may lack an effect.
+        clean: Clean recordings.
         elsewhere: Whether it is for a path of which there is no clean recording.
     """
     from ..inference.criticism import CleanData, KnownNoise, learned_model_error
 
-    if not clean:
-        return None
+    known = stirring_error(viscosity)
     only = stirring.recordings[0] if len(stirring.recordings) == 1 and not elsewhere else None
-    same = [only is not None and same_experiment(one.recording, only) for one in clean]
-    distances = regime_distance(
-        [one.viscosity for one in clean], viscosity, stirring.least_viscosity
-    )
-    # the whole recording tells white noise better than the short rest tells correlated noise
-    return learned_model_error(
-        [
-            CleanData(one.residual, KnownNoise(sensor_noise(one.recording.inclination)), *where)
-            for one, *where in zip(clean, same, distances, strict=True)
-        ]
-    )
+
+    def here(one: Clean) -> CleanData:
+        """What the simulator would leave of it in a liquid of this viscosity."""
+        share = known / stirring_error(one.viscosity)
+        # the whole recording tells white noise better than the short rest tells correlated noise
+        noise = KnownNoise(share * sensor_noise(one.recording.inclination))
+        same = only is not None and same_experiment(one.recording, only)
+        distance = regime_distance(one.viscosity, viscosity, stirring.least_viscosity)
+        return CleanData(share * one.residual, noise, same, distance)
+
+    return learned_model_error([here(one) for one in clean], known_error(stirring, known))
 
 
-def regime_distance(
-    known: Sequence[float | None], viscosity: float | None, least: float
-) -> NDArray[np.float64]:
-    """Distance of liquids from another one in units of the errors' correlation, shape (n,).
+def known_error(stirring: StirSimulator, size: float) -> "ModelError":
+    """An error of this size [rad], as the simulator makes it on a run's recordings.
 
-    The simulator errs by half a degree in water and by less than 0.05 degrees in glycerin.
-
-    Args:
-        known: Their viscosities [Pa s]; all are alike where one is not known.
-        viscosity: Of the other [Pa s], by the model that lacks the effect.
-        least: Below it liquids look alike [Pa s].
-    """
-    if viscosity is None or None in known:
-        return np.zeros(len(known))
-    ratio = np.maximum(np.array(known, float), least) / max(viscosity, least)
-    return np.log(ratio) / np.log(VISCOSITY_FACTOR)
-
-
-def model_error(
-    stirring: StirSimulator, viscosity: float, clean: Sequence[Clean] = ()
-) -> "ModelError":
-    """The simulator's error on a run's recordings, in a liquid of so many Pa s; learned from clean
-    recordings where there are any.
-
-    Without them it has two parts. One, of size `models.stirring_error`, is correlated as the
-    recorded inclination is: in the reference's oil the simulated stick swings as if the viscosity
-    were 8 % larger, which an error with a correlation of tenths of seconds would not explain. The
-    other is half as large and forgotten within tenths of seconds, as most of the error in cream
-    is: whatever does not swing like the stick would count as free of errors.
+    It has two parts. One is correlated as the recorded inclination is: in the reference's oil the
+    simulated stick swings as if the viscosity were 8 % larger, which an error with a correlation of
+    tenths of seconds would not explain. The other is half as large, beside it, and forgotten within
+    tenths of seconds, as most of the error in cream is: whatever does not swing like the stick
+    would count as free of errors.
     """
     from ..inference.criticism import model_error, rhythm
 
-    learned = usual_for(stirring, clean, viscosity)
-    if learned is not None:
-        return learned
     swings = rhythm(stirring.observed)
     lags = frame_interval(stirring.recordings[0]) * np.arange(len(swings))
     share = SHORT_PART**2
     correlation = (swings + share * np.exp(-lags / SHORT_TIME)) / (1.0 + share)
-    return model_error(stirring_error(viscosity) * np.sqrt(1.0 + share), correlation)
+    return model_error(size * np.sqrt(1.0 + share), correlation, KNOWN_FREEDOM)
+
+
+def regime_distance(one: float, other: float, least: float) -> float:
+    """Distance of liquids in units of the errors' correlation.
+
+    The simulator errs by half a degree in water and by less than 0.05 degrees in glycerin.
+
+    Args:
+        one, other: Their viscosities [Pa s].
+        least: Below it liquids look alike [Pa s].
+    """
+    ratio = max(one, least) / max(other, least)
+    return float(np.log(ratio) / np.log(VISCOSITY_FACTOR))
 
 
 def noise_beside(stirring: StirSimulator, error: "ModelError") -> "SumOfNoises":

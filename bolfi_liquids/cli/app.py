@@ -10,7 +10,13 @@ import typer
 
 from .. import __version__
 from ..guide import PAGES, for_terminal
-from ..inputs.settings import CalibrationSettings, CriticismSettings, PourSettings, SbcSettings
+from ..inputs.settings import (
+    BaselineSettings,
+    CalibrationSettings,
+    CriticismSettings,
+    PourSettings,
+    SbcSettings,
+)
 from ..wording import command
 from . import import_table, printed
 from . import record as cli_record
@@ -118,6 +124,35 @@ def calibrate(  # noqa: PLR0913  an option each
     printed.print_calibration(calibration)
     printed.print_warnings(results)
     printed.print_next_pour(results.latest, "criticise")
+
+
+@app.command(
+    epilog=examples(
+        "baseline oil.nc glycerin.nc --out rig_error.nc",
+        "criticise runs/mine --baseline rig_error.nc",
+    )
+)
+@grouped
+def baseline(
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(metavar="RECORDING", help="Of any liquids, without an effect."),
+    ],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="To be written, in .nc.")],
+    settings: BaselineSettings,
+    compute: ComputeOptions,
+) -> None:
+    """Learn the simulator's own error on a rig, once for all runs.
+
+    What has finished is kept in a file of the same name that ends in .sqlite: repeat the command
+    after an interruption, or with further recordings. Give FILE to calibrate and criticise.
+    """
+    from ..calibration.baseline import learn_baseline
+
+    with compute.arguments() as where:
+        made = learn_baseline(recordings, out=out, **asdict(settings), **where)
+    printed.print_baseline(made)
+    printed.print_next(command("criticise", "RUN", "--baseline", made.path))
 
 
 @app.command(

@@ -197,8 +197,9 @@ PoursOption = Annotated[
 BaselineOption = Annotated[
     list[Path] | None,
     typer.Option(
-        metavar="RECORDING",
-        help="Of any liquid, without an effect: shows the simulator's own error. Repeatable.",
+        metavar="FILE",
+        help="Recording of any liquid without an effect, or what `baseline` made of several: shows "
+        "the simulator's own error. Repeatable.",
     ),
 ]
 

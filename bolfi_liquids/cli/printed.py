@@ -1,5 +1,6 @@
 """What commands print when they are done."""
 
+import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -7,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from ..wording import command
+from ..wording import command, degrees
 
 if TYPE_CHECKING:
+    from ..calibration.baseline import Baseline
     from ..calibration.result import Calibration
     from ..criticism.result import Criticism
     from ..hardware import Check
@@ -51,6 +53,22 @@ def print_calibration(calibration: "Calibration") -> None:
     columns = {"mean": "mean", "sd": "sd", "5 %": "q05", "50 %": "q50", "95 %": "q95"}
     _print_table("parameter", columns | {"closest": "closest"}, rows)
     _print_prose(("fit", "effort"), {"calibration": facts})
+
+
+def print_baseline(baseline: "Baseline") -> None:
+    """What the simulator leaves of each clean recording, beside the error that is known."""
+    from ..models import stirring_error
+
+    rows = {
+        one.recording.path.name: {
+            "viscosity": f"{one.viscosity:.3g}",
+            "error": degrees(math.degrees(one.error)),
+            "known": degrees(math.degrees(stirring_error(one.viscosity))),
+        }
+        for one in baseline.clean
+    }
+    columns = {"viscosity Pa s": "viscosity", "error": "error", "known error": "known"}
+    _print_table("clean recording", columns, rows)
 
 
 def print_pour(pour: "Pour") -> None:

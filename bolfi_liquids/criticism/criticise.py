@@ -7,7 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..calibration.model_error import Clean, clean_residuals, usual_for
+from ..calibration.baseline import CleanSource, open_clean
+from ..calibration.model_error import Clean, clean_residuals, model_error
 from ..calibration.result import Calibration
 from ..calibration.stirs import (
     effects_of,
@@ -15,7 +16,7 @@ from ..calibration.stirs import (
     stir_experiment,
     stir_proposals,
 )
-from ..errors import Argument, InputError
+from ..errors import Argument
 from ..inputs.frame import recording_warnings
 from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import Pours, PourTable
@@ -45,7 +46,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     calibration: RunOrPath,
     *,
     held_out: Source | Sequence[Source] = (),
-    baseline: Source | Sequence[Source] = (),
+    baseline: CleanSource | Sequence[CleanSource] = (),
     pours: Pours | None = None,
     held_out_pours: Pours | None = None,
     cups: "Cups | str | Path | None" = None,
@@ -67,7 +68,9 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         held_out: Recordings of the same liquid and rig by another path or speed. They are not
             fitted, and an effect that is named must hold on them.
         baseline: Clean recordings of the same rig, of any liquid, in which no effect is believed
-            to be missing: their residuals count as simulator error.
+            to be missing, and files of `learn_baseline`: they show what error the simulator
+            makes on this rig. Without them it is the one that is known, see
+            `models.stirring_error`.
         pours: A table of pours of the liquid, or its path; a second source. `choose_pour` uses
             them in any case.
         held_out_pours: Another, to which nothing is fitted.
@@ -89,9 +92,9 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     # their rules make them tuples
     named: dict[str, Any] = {"effects": effects, "accept": accept}
     settings = CriticismSettings(**named, seed=seed, batch=batch)
-    check_effects(settings)
+    check_effects(settings, ("stir",) if pours is None else ("stir", "pour"))
     kept_back = open_recordings(held_out, Argument("held_out"))
-    clean = open_recordings(baseline, Argument("baseline"))
+    clean = open_clean(baseline)
     with Run.entered(calibration) as run:
         base = Calibration.of(run)
         poured = pours, held_out_pours
@@ -122,7 +125,7 @@ def _find(
     """Criticism of each source, and the number of simulations of clean recordings before."""
     particles = inputs.stirring.setups[0].particles
     clean = clean_residuals(
-        inputs.baseline, particles, calibration.prior, compute=compute, report=report
+        inputs.clean, particles, calibration.prior, compute=compute, report=report
     )
     how: dict[str, Any] = {
         "executor": compute.executor,
@@ -147,17 +150,17 @@ def _stirs(
 
     stirring, settings, cameras = inputs.stirring, inputs.settings, inputs.cameras
     extensions = effects_of("stir", settings.effects)
-    viscosity = calibration.summary.best.get("viscosity")
+    viscosity = calibration.summary.best["viscosity"]
 
     def experiment(own: StirSimulator, noise: "AutoregressiveNoise", label: str):
-        return stir_experiment(own, noise, usual_for(own, clean, viscosity), label)
+        return stir_experiment(own, noise, model_error(own, viscosity, clean), label)
 
     def held_out(recording: Recording) -> "inference.criticism.Experiment":
         own = stir_simulator([recording], stirring.setups[0].particles)
         noise = held_out_noise(recording, stirring.recordings)
         return experiment(own, noise, recording.path.name)
 
-    elsewhere = usual_for(stirring, clean, viscosity, elsewhere=True)
+    elsewhere = model_error(stirring, viscosity, clean, elsewhere=True)
     return inference.criticism.criticise(
         experiment(stirring, cameras, "stir"),
         calibration.prior,
@@ -186,12 +189,6 @@ def _pours(
     known = stirs.extended or stirs.base.hypothesis
     poured_too = [name for name in stirs.accepted if name in acting]
     extensions = {name: one for name, one in acting.items() if name not in poured_too}
-    if not extensions:
-        raise InputError(
-            f"all effects that act in pours ({', '.join(acting)}) are part of the stirs' model",
-            where=Argument("effects"),
-            fix="give further effects to look for in the pours, or no `pours`",
-        )
     taught = as_prior(stirs.posterior.theta, stirs.posterior.weights, known.fit.prior)
     names = (*prior.names, *poured_too)
     held_out = [one for one in (inputs.held_out_table,) if one is not None]

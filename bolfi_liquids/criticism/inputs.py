@@ -1,13 +1,14 @@
 """What a criticism is given, read and checked."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..calibration.baseline import Baseline, Part, parts_of, recording_of
 from ..calibration.model_error import check_beside
 from ..calibration.result import Calibration
 from ..calibration.stirs import camera_noise, names_of_effects
@@ -30,7 +31,8 @@ class Inputs:
         after: Key of the posterior that is criticised.
         stirring: What the run was calibrated on.
         held_out: Recordings of the same liquid that nothing is fitted to.
-        baseline: Clean recordings; none of those before.
+        baseline: Clean recordings, none of those before, and files of such.
+        clean: The recordings in all of them, but those before.
         left_out: Names of recordings that were given as clean, but are criticised or held out.
         table: Pours of the liquid, if there are any.
         held_out_table: Pours of the liquid that nothing is fitted to, if there are any.
@@ -41,7 +43,8 @@ class Inputs:
     after: str
     stirring: StirSimulator
     held_out: tuple[Recording, ...]
-    baseline: tuple[Recording, ...]
+    baseline: tuple[Recording | Baseline, ...]
+    clean: tuple[Part, ...]
     left_out: tuple[str, ...]
     table: PourTable | None
     held_out_table: PourTable | None
@@ -51,7 +54,7 @@ class Inputs:
     @property
     def compared(self) -> tuple[Recording, ...]:
         """Recordings beside those that were calibrated on."""
-        return (*self.held_out, *self.baseline)
+        return (*self.held_out, *map(recording_of, self.clean))
 
     @property
     def density(self) -> float:
@@ -98,7 +101,7 @@ def open_inputs(
     calibration: Calibration,
     settings: CriticismSettings,
     held_out: list[Recording],
-    baseline: list[Recording],
+    baseline: list[Recording | Baseline],
     poured: tuple[Pours | None, Pours | None] = (None, None),
     cups: "Cups | str | Path | None" = None,
 ) -> Inputs:
@@ -115,13 +118,13 @@ def open_inputs(
     particles = int(calibration.record["settings"]["particles"])
     stirring = stir_simulator(calibration.run.recordings, particles)
     check_beside(stirring, held_out, "held_out")
-    used = {recording.hash for recording in (*stirring.recordings, *held_out)}
-    clean = {recording.hash: recording for recording in baseline if recording.hash not in used}
-    left_out = dict.fromkeys(one.path.name for one in baseline if one.hash in used)
-    check_beside(stirring, list(clean.values()), "baseline")
+    used = (*stirring.recordings, *held_out)
+    clean, left_out = parts_of(baseline, used, particles)
+    check_beside(stirring, list(map(recording_of, clean)), "baseline")
+    others = {one.hash: one for one in baseline if one.hash not in {two.hash for two in used}}
     table, cups = table_and_cups(poured[0], cups)
     held_out_table = table_of(poured[1], Argument("held_out_pours"))
-    for where, what, fix in _pours_faults(settings, table, held_out_table):
+    for where, what, fix in _pours_faults(table, held_out_table):
         raise InputError(what, where=Argument(where), fix=fix)
     if held_out_table is not None:
         check_scene(held_out_table, cups)
@@ -129,7 +132,8 @@ def open_inputs(
         after=calibration.key,
         stirring=stirring,
         held_out=tuple(held_out),
-        baseline=tuple(clean.values()),
+        baseline=tuple(others.values()),
+        clean=tuple(clean),
         left_out=tuple(left_out),
         table=table,
         held_out_table=held_out_table,
@@ -138,22 +142,27 @@ def open_inputs(
     )
 
 
-def check_effects(settings: CriticismSettings) -> None:
-    """Raise InputError unless the effects exist, and one acts in a stir."""
-    for where, what, fix in _effects_faults(settings):
+def check_effects(settings: CriticismSettings, scenes: Sequence[str]) -> None:
+    """Raise InputError unless the effects exist, and one acts in one of the scenes."""
+    for where, what, fix in _effects_faults(settings, scenes):
         raise InputError(what, where=Argument(where), fix=fix)
 
 
-def _effects_faults(settings: CriticismSettings) -> Iterator[tuple[str, str, str]]:
+def _effects_faults(
+    settings: CriticismSettings, scenes: Sequence[str]
+) -> Iterator[tuple[str, str, str]]:
     """Options that cannot be used, why, and what to do about each."""
     from ..models import EFFECTS
 
-    stir, considered = names_of_effects("stir"), settings.effects or tuple(EFFECTS)
+    acting = [name for scene in scenes for name in names_of_effects(scene)]
+    considered = settings.effects or tuple(EFFECTS)
     for name in considered:
         if name not in EFFECTS:
             yield "effects", f"there is no effect {name}", f"choose from {', '.join(EFFECTS)}"
-    if not set(considered) & set(stir):
-        yield "effects", "none of the effects acts in a stir", f"choose from {', '.join(stir)}"
+    if not set(considered) & set(acting):
+        what = f"none of the effects acts in a {' or in a '.join(scenes)}"
+        pours = "" if "pour" in scenes else ", or give `pours` in which they act"
+        yield "effects", what, f"choose from {', '.join(dict.fromkeys(acting))}{pours}"
     for name in settings.accept or ():
         if name not in considered:
             what = f"{name!r} is none of the effects that are considered"
@@ -161,13 +170,9 @@ def _effects_faults(settings: CriticismSettings) -> Iterator[tuple[str, str, str
 
 
 def _pours_faults(
-    settings: CriticismSettings, table: PourTable | None, held_out: PourTable | None
+    table: PourTable | None, held_out: PourTable | None
 ) -> Iterator[tuple[str, str, str]]:
     """Arguments about pours that cannot be used, why, and what to do about each."""
-    pour = names_of_effects("pour")
-    if table is not None and not set(settings.effects or pour) & set(pour):
-        fix = f"choose from {', '.join(pour)}, or give no `pours`"
-        yield "effects", "none of the effects acts in a pour", fix
     if held_out is not None:
         where = f"held_out_pours {held_out.path}"
         if table is None:

@@ -130,8 +130,8 @@ class GapSummary:
         before, after: What exceeds noise and the usual residual, in quadrature.
         held_out_before, held_out_after: The same on recordings that were not fitted.
         noise, held_out_noise: What cameras and simulator's seeds leave of a right model.
-        usual, held_out_usual: What the simulator leaves of clean recordings besides, 0 where none
-            was given; the latter is None where nothing was held out.
+        usual, held_out_usual: What the simulator is known, or was seen, to leave of clean
+            recordings besides; the latter is None where nothing was held out.
         rms_before, rms_after, held_out_rms_before, held_out_rms_after: The RMS itself.
     """
 
@@ -340,7 +340,7 @@ class CriticismSummary(Section):
                 for one in source.suggestions
             ),
             untested=tuple(name for source in given for name in source.untested),
-            baseline=len(inputs.baseline),
+            baseline=len(inputs.clean),
             baseline_left_out=inputs.left_out,
             noise=CameraNoise.of(inputs.cameras),
             seconds=seconds,

@@ -148,6 +148,13 @@ class CalibrationSettings:
 
 
 @checked()
+class BaselineSettings:
+    """Settings of a baseline, beside its recordings and prior."""
+
+    particles: Particles = 0
+
+
+@checked()
 class SbcSettings:
     """Settings of a check of calibrations; a recording gives path and rig."""
 

@@ -113,8 +113,9 @@ def _criticism_figures(criticism: Criticism) -> dict[str, "Figure"]:
     if "pours" in sources:
         drawn["pours"] = pour_residual_plot(sources["pours"])
     for name, source in sources.items():
-        drawn[f"scores-{name}"] = score_plot(source)
-        drawn[f"confusion-{name}"] = confusion_plot(source)
+        if source["effects"].sizes["effect"]:  # else none acts there
+            drawn[f"scores-{name}"] = score_plot(source)
+            drawn[f"confusion-{name}"] = confusion_plot(source)
     return {name: plot.figure for name, plot in drawn.items()}
 
 

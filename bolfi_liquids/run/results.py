@@ -39,6 +39,11 @@ def write_result(tree: "DataTree", path: Path) -> None:
     write_whole(path, lambda temporary: temporary.write_bytes(content + _end_of(content)))
 
 
+def is_result(path: Path) -> bool:
+    """Whether `write_result` wrote a file, which may be damaged."""
+    return path.read_bytes()[-END:].startswith(MARK)
+
+
 def read_result(path: Path) -> "DataTree":
     """The tree that `write_result` wrote.
 

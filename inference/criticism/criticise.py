@@ -176,7 +176,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     Args:
         experiment: What was observed, and the simulator.
         prior: Of the base parameters.
-        extensions: What the simulator may lack, by name.
+        extensions: What the simulator may lack, by name; without any, it is only tested.
         earlier: Runs of the base model made before: theta, signals, seeds.
         held_out: Experiments that nothing is fitted to.
         proposals: Experiments that could be made next.

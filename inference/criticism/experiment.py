@@ -174,10 +174,8 @@ def extended(prior: Prior, extensions: Extensions, names: tuple[str, ...]) -> Pr
 
 def check_extensions(prior: Prior, extensions: object) -> None:
     """Raise ValueError unless they map new names to extensions."""
-    if not isinstance(extensions, Mapping) or not extensions:
-        raise ValueError(
-            f"extensions must map at least one name to an Extension, got {extensions!r:.100}"
-        )
+    if not isinstance(extensions, Mapping):
+        raise ValueError(f"extensions must map names to an Extension, got {extensions!r:.100}")
     for name, extension in extensions.items():
         check_kind(f"extension {name!r}", extension, Extension)
         if name in prior.names:

@@ -91,11 +91,13 @@ class ModelError:
         freedom: Weight of the clean data: the size is known as well as a variance from so many
             numbers, but never less than from MIN_FREEDOM.
         clean: What it was learned from.
+        known: What was known of it without them, if anything.
     """
 
     autocovariance: np.ndarray
     freedom: float
     clean: tuple[CleanData, ...] = ()
+    known: "ModelError | None" = None
 
     def mean(self, at: Layout) -> np.ndarray:
         """Expected residual of the simulator [n]."""
@@ -130,13 +132,14 @@ class ModelError:
 
         Those are left out of whose regime the others tell next to nothing.
         """
-        for k, (one, weight) in enumerate(zip(self.clean, _weights(self.clean), strict=True)):
+        weights = _weights(self.clean, self.known)
+        for k, (one, weight) in enumerate(zip(self.clean, weights, strict=True)):
             others = [
                 replace(other, regime_distance=other.regime_distance - one.regime_distance)
                 for other in self.clean[:k] + self.clean[k + 1 :]
             ]
             if one.same and sum(_likeness(other.regime_distance) for other in others) >= MIN_OTHERS:
-                yield one, float(weight), learned_model_error(others)
+                yield one, float(weight), learned_model_error(others, self.known)
 
     def _given(self, at: Layout) -> tuple[np.ndarray, np.ndarray]:
         """Mean and covariance given the repetitions."""
@@ -197,18 +200,27 @@ def _correlation(one: CleanData, other: CleanData) -> float:
     return 1.0 if one is other else REPEATED * float(_likeness(apart))
 
 
-def learned_model_error(clean: Sequence[CleanData]) -> ModelError:
+def learned_model_error(clean: Sequence[CleanData], known: ModelError | None = None) -> ModelError:
     """Learn a simulator's model error from clean data.
 
     A simulator may err by much in one regime and by nothing in another: what is learned of sizes is
-    learned from the nearest.
+    learned from the nearest. Where its errors are known to differ between regimes, give each
+    residual and its noise times the error known here over the one known there.
+
+    Args:
+        clean: In which no effect is believed to be missing.
+        known: What is known of the error without them, see `model_error`: it counts as clean data
+            of this very regime, `known.freedom` of them.
 
     Raises:
-        ValueError: there are none, they differ in their number of channels, or those of the same
-            experiment in their shape.
+        ValueError: there are none and nothing is known, they differ in their number of channels,
+            or those of the same experiment in their shape.
     """
     for one in clean:
         check_kind("each of clean", one, CleanData)
+    check_kind("known", known, ModelError | None)
+    if known is not None and not clean:
+        return known
     shapes = [one.residual.shape for one in clean]
     repeated = {one.residual.shape for one in clean if one.same}
     if len({channels for _, channels in shapes}) != 1 or len(repeated) > 1:
@@ -216,14 +228,16 @@ def learned_model_error(clean: Sequence[CleanData]) -> ModelError:
             "clean must hold at least one data set, all of as many channels, and repetitions of "
             f"one experiment of one shape, got the shapes {shapes}"
         )
-    weight = _weights(clean)
-    lags = max(len(one.residual) for one in clean)
+    before = np.zeros(0) if known is None else known.autocovariance
+    lags = max(len(before), *(len(one.residual) for one in clean))
     each = [
         _autocovariance(one.residual, lags) - _expected_of(one.noise, len(one.residual), lags)
         for one in clean
     ]
-    mean = np.average(each, axis=0, weights=weight)
-    return ModelError(positive_autocovariance(mean), float(weight.sum()), tuple(clean))
+    weights = [*_weights(clean, known), 0.0 if known is None else known.freedom]
+    each.append(np.pad(before, (0, lags - len(before))))
+    mean = np.average(each, axis=0, weights=weights)
+    return ModelError(positive_autocovariance(mean), float(np.sum(weights)), tuple(clean), known)
 
 
 def model_error(size: float, correlation: ArrayLike, freedom: float = KNOWN_FREEDOM) -> ModelError:
@@ -273,10 +287,11 @@ def rhythm(observed: ArrayLike) -> np.ndarray:
     return found / found[0] if found[0] > 0.0 else np.ones(1)
 
 
-def _weights(clean: Sequence[CleanData]) -> np.ndarray:
-    """Weights by the distance of regimes; the nearest has weight 1."""
+def _weights(clean: Sequence[CleanData], known: ModelError | None) -> np.ndarray:
+    """Weights by the distance of regimes; the nearest has weight 1 where nothing else is known."""
     square = np.array([one.regime_distance**2 for one in clean])
-    return np.maximum(np.exp(-0.5 * (square - np.min(square, initial=np.inf))), MIN_WEIGHT)
+    least = 0.0 if known is not None else np.min(square, initial=np.inf)
+    return np.maximum(np.exp(-0.5 * (square - least)), MIN_WEIGHT)
 
 
 def split_noise(noise: Noise) -> tuple[Noise, ModelError | None]:

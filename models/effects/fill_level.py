@@ -6,7 +6,7 @@ from ..effect import Effect
 def _prior():
     import numpyro.distributions as dist
 
-    return dist.Normal(0.0, 1e-3)
+    return dist.Normal(0.0, 3e-3)
 
 
 def _rig(rig, coefficient):

@@ -14,7 +14,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from against import neighbours, pour_bars
 from bolfi_liquids.models.accuracy import LARGEST_ERRORS
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -136,7 +135,6 @@ def page(measured: Record) -> str:
         pours=pours[usual]["liquids"],
         across=pours[usual]["across"],
         pour_bars=pour_bars,
-        any_viscosity=np.inf,
         finer={width: one["across"] for width, one in pours.items() if width != usual},
         made=measured["physics"]["made"],
         timed=measured["stirs"]["made"],

@@ -27,7 +27,7 @@ from bolfi_liquids.inference.simulations import Compute
 from kept import keep, results
 
 from bolfi_liquids import inference, models
-from bolfi_liquids.calibration.model_error import Clean, clean_residuals, usual_for
+from bolfi_liquids.calibration.model_error import Clean, clean_residuals, model_error
 from bolfi_liquids.calibration.stirs import (
     camera_noise,
     effects_of,
@@ -126,7 +126,8 @@ def _criticised_stirs(
     def experiment(recording: Recording, cameras: criticism.AutoregressiveNoise):
         stirring = stir_simulator([recording], MODEL)
         name = recording.path.stem
-        return stir_experiment(stirring, cameras, usual_for(stirring, usual), name)
+        error = model_error(stirring, truth["viscosity"], usual)
+        return stir_experiment(stirring, cameras, error, name)
 
     return criticism.criticise(
         experiment(star, camera_noise([star])),

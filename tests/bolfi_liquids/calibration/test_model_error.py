@@ -1,4 +1,4 @@
-"""The intervals of a calibration allow for an error of the simulator, usual or learned."""
+"""The simulator's own error, known and learned, for which a calibration's intervals allow."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -12,10 +12,16 @@ from bolfi_liquids.models import stirring_error
 import bolfi_liquids as bl
 from bolfi_liquids import inference
 from bolfi_liquids.calibration.engine_fit import closest_drawn
-from bolfi_liquids.calibration.model_error import SHORT_PART, model_error
+from bolfi_liquids.calibration.model_error import (
+    KNOWN_FREEDOM,
+    SHORT_PART,
+    Clean,
+    model_error,
+    regime_distance,
+)
 from bolfi_liquids.reporting.facts import fit_facts
 from bolfi_liquids.reporting.prose import prose
-from bolfi_liquids.simulators import stir_simulator
+from bolfi_liquids.simulators import StirSimulator, stir_simulator
 from bolfi_liquids.wording import degrees
 
 
@@ -25,7 +31,7 @@ def stirring(short_recording):
 
 
 @pytest.mark.parametrize("viscosity", [0.001, 1.0])
-def test_the_usual_error_has_its_size_and_the_correlation_of_the_recording(stirring, viscosity):
+def test_the_known_error_has_its_size_and_the_correlation_of_the_recording(stirring, viscosity):
     error = model_error(stirring, viscosity)
     assert np.sqrt(error.autocovariance[0]) == pytest.approx(
         np.hypot(1.0, SHORT_PART) * stirring_error(viscosity)
@@ -38,10 +44,78 @@ def test_the_usual_error_has_its_size_and_the_correlation_of_the_recording(stirr
     assert covariance[0, 1] > 0.5 * covariance[0, 0]
 
 
+def test_the_known_error_falls_smoothly_with_the_viscosity():
+    viscosities = np.geomspace(1e-4, 20.0, 400)
+    sizes = [stirring_error(one) for one in viscosities]
+    steps = np.diff(np.log(sizes)) / np.diff(np.log(viscosities))
+    assert (steps <= 1e-9).all() and (steps >= -2.0).all()
+    assert stirring_error(0.0) == stirring_error(0.001) > stirring_error(1.0)
+    assert np.isnan(stirring_error(np.nan))
+
+
+def left(stirring, viscosity, multiple, rng):
+    """A clean recording of which the simulator leaves so many times its known error."""
+    (recording,) = stirring.recordings
+    size = multiple * stirring_error(viscosity)
+    return Clean(recording, size * rng.normal(size=recording.inclination.shape), viscosity, 1)
+
+
+@pytest.mark.parametrize(
+    ("viscosities", "multiple"),
+    [
+        ([], 1.0),
+        # as many of this liquid as the known error counts for, and one far away
+        ([0.4] * int(KNOWN_FREEDOM) + [0.001], np.sqrt((1.0 + 3.0**2) / 2.0)),
+        ([0.001] * 9, 1.0),
+    ],
+)
+def test_clean_recordings_show_a_multiple_of_the_known_error_where_they_are_near(
+    stirring, rng, viscosities, multiple
+):
+    """Recorded without noise, so that all that is left is the simulator's."""
+    (recording,) = stirring.recordings
+    still = replace(recording, inclination=0.0 * recording.inclination)
+    exact = StirSimulator((still,), stirring.setups)
+    clean = [left(exact, one, 3.0, rng) for one in viscosities]
+    known, learned = model_error(exact, 0.4), model_error(exact, 0.4, clean)
+    assert learned.autocovariance[0] / known.autocovariance[0] == pytest.approx(
+        multiple**2, rel=0.3
+    )
+    assert learned.freedom == pytest.approx(
+        KNOWN_FREEDOM + sum(one == 0.4 for one in viscosities), abs=1e-3
+    )
+
+
+def test_a_thinner_liquid_s_residual_is_that_of_a_smaller_error_here(stirring, rng):
+    """Twice as thick, the simulator errs by less: both are the same multiple of what is known."""
+    thin, thick = (model_error(stirring, 0.3, [left(stirring, v, 1.0, rng)]) for v in (0.15, 0.3))
+    known = model_error(stirring, 0.3)
+    for error in (thin, thick):
+        assert error.autocovariance[0] < 1.3 * known.autocovariance[0]
+    residual = left(stirring, 0.15, 1.0, rng).residual
+    (one,) = model_error(stirring, 0.3, [Clean(*stirring.recordings, residual, 0.15, 1)]).clean
+    ratio = stirring_error(0.3) / stirring_error(0.15)
+    np.testing.assert_allclose(one.residual, ratio * residual)
+    assert one.regime_distance == pytest.approx(-1.0)
+
+
+def test_clean_recordings_of_the_same_path_show_where_it_errs(stirring, rng):
+    clean = [left(stirring, 0.5, 10.0, rng)]
+    same, elsewhere = (model_error(stirring, 0.5, clean, elsewhere=e) for e in (False, True))
+    assert [one.same for one in same.clean] == [True]
+    assert [one.same for one in elsewhere.clean] == [False]
+
+
+def test_liquids_are_as_far_apart_as_their_viscosities():
+    """In doublings; water is water, wherever below the least viscosity it was fitted."""
+    for one, other, distance in ((0.1, 0.4, -2), (1.6, 0.4, 2), (3e-4, 0.001, 0), (0.01, 1e-3, 1)):
+        assert regime_distance(one, other, 0.005) == pytest.approx(distance)
+
+
 def test_a_calibration_says_for_which_error_it_allows(calibration):
     summary = calibration.summary
-    usual = np.degrees([stirring_error(v) for v in (0.001, 0.05, 0.1, 1.0)])
-    assert np.isclose(summary.model_error_deg, np.hypot(1.0, SHORT_PART) * usual).any()
+    known = np.degrees(stirring_error(summary.best["viscosity"]))
+    assert summary.model_error_deg == pytest.approx(np.hypot(1.0, SHORT_PART) * known, rel=0.2)
     for changes, words in (
         ({}, [degrees(summary.model_error_deg), "usual"]),
         ({"clean": ("a.nc", "b.nc")}, ["learned from a.nc, b.nc"]),

@@ -1,4 +1,4 @@
-"""Windows of a stir, the noise in it, and what clean recordings say of the simulator's error."""
+"""Windows of a stir, the noise in it, and stirs to propose."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.motion import Trajectory, star
 
-from bolfi_liquids.calibration.model_error import Clean, regime_distance, usual_for
 from bolfi_liquids.calibration.stirs import (
     camera_noise,
     held_out_noise,
-    stir_experiment,
     stir_proposals,
     windows,
 )
@@ -83,21 +81,6 @@ def test_a_camera_without_any_noise_is_not_believed(stirred, rng):
         assert refused.value.where == still.path.name
 
 
-def test_clean_recordings_of_the_same_path_say_where_it_errs(stirred, rng):
-    recording = noisy(stirred, rng)
-    residual = 10.0 * SD * np.sin(np.linspace(0.0, 9.0, len(recording.time)))[:, None] * [1.0, 0.5]
-    clean = [Clean(recording, residual, 1.0, 1)]
-    stirring = stir_simulator([recording], 200)
-    same, elsewhere = (usual_for(stirring, clean, 0.5, elsewhere=other) for other in (False, True))
-    assert [one.same for one in same.clean] == [True]
-    assert [one.same for one in elsewhere.clean] == [False]
-    cameras = camera_noise([recording])
-    noise = stir_experiment(stirring, cameras, same, "stir").noise
-    assert [type(part).__name__ for part in noise.parts] == ["AutoregressiveNoise", "ModelError"]
-    assert usual_for(stirring, [], 0.5) is None
-    assert stir_experiment(stirring, cameras, None, "stir").noise is cameras
-
-
 def test_proposed_stirs_stay_within_the_cup_and_below_the_limit_of_speed(stirred, rng):
     gripper, factor = stirred.gripper, np.array([1.5, 1.5, 1.0])  # a path beyond the cup
     wide = replace(stirred, gripper=Trajectory(gripper.time, factor * gripper.position))
@@ -112,12 +95,3 @@ def test_proposed_stirs_stay_within_the_cup_and_below_the_limit_of_speed(stirred
         assert one.shape == plan.inclination.shape
         step = np.linalg.norm(np.diff(path, axis=0), axis=1) / np.diff(plan.gripper.time)
         assert step.max() < 0.21
-
-
-def test_liquids_are_as_far_apart_as_their_viscosities():
-    """In doublings; all are alike where one is unknown."""
-    np.testing.assert_allclose(regime_distance([0.1, 0.4, 1.6], 0.4, 0.005), [-2.0, 0.0, 2.0])
-    assert (regime_distance([0.001, 0.1], None, 0.005) == 0.0).all()
-    assert (regime_distance([None, 1.0], 1.0, 0.005) == 0.0).all()
-    # water is water, wherever below the least viscosity it was fitted
-    np.testing.assert_allclose(regime_distance([3e-4, 0.004, 0.01], 0.001, 0.005), [0.0, 0.0, 1.0])

@@ -1,5 +1,6 @@
 """What a criticism is given: read, checked and written down."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 import xarray as xr
 
 import bolfi_liquids as bl
+from bolfi_liquids.cli.printed import print_findings
 from bolfi_liquids.criticism.inputs import open_inputs
 from bolfi_liquids.errors import Argument, InputError
 from bolfi_liquids.inputs.bundled import bundled_recording
@@ -115,15 +117,11 @@ def test_one_recording_that_was_opened_is_not_held_out_twice(calibration, given)
         ({"pours": "pours", "held_out_pours": "pours"}, "held_out_pours"),
         ({"pours": "pours", "held_out_pours": "far"}, "far.csv"),
         ({"pours": "pours", "cups": 3}, "cups"),
-        ({"settings": {"effects": "camera_delay"}, "pours": "pours"}, "effects"),
     ],
 )
 def test_what_cannot_be_used_is_refused_by_its_name(given, names, where):
-    options: dict = dict(names)
-    if "settings" in names:
-        options["settings"] = CriticismSettings(**names["settings"])
     with pytest.raises(InputError) as refused:
-        given(**options)
+        given(**names)
     assert where in refused.value.where
 
 
@@ -139,6 +137,24 @@ def test_effects_are_refused_before_the_run_is_looked_at(tmp_path, options, wher
     with pytest.raises(InputError) as refused:
         bl.criticise(tmp_path, **options)
     assert where in refused.value.where
+
+
+@pytest.mark.slow
+def test_an_effect_of_pours_alone_is_looked_for_there_and_stirs_are_tested(
+    calibration, pour_settings, tmp_path
+):
+    run, table = tmp_path / "run", tmp_path / "pours.csv"
+    shutil.copytree(calibration.path, run)
+    table.write_text("\n".join([HEADER, "90,1,5,90,5", "90,2,9,86,5", "90,3,20,75,5"]))
+    found = bl.criticise(
+        run, effects="adhesion", pours=table, cups=pour_settings["cups"], progress=False
+    )
+    of_stirs, of_pours = (found.tree[f"{name}/effects"] for name in ("stirs", "pours"))
+    assert not of_stirs.sizes["effect"] and list(of_pours["effect"].values) == ["adhesion"]
+    assert found.summary.stirs.verdict in ("none", "unknown") and not found.summary.stirs.effects
+    assert bl.Criticism.open(run).verdict == found.verdict
+    print_findings(found)
+    assert "adhesion" in bl.report(run, moving=False, progress=False).read_text(encoding="utf-8")
 
 
 def test_what_is_held_out_or_clean_in_a_wrong_frame_is_told(calibration, caplog):

@@ -51,7 +51,7 @@ GOOD = {
     [
         ({"experiment": 3}, "experiment"),
         ({"prior": {"a": POSITIVE}}, "prior"),
-        ({"extensions": {}}, "extensions"),
+        ({"extensions": ["drift"]}, "extensions"),
         ({"extensions": {"drift": POSITIVE}}, "drift"),
         ({"extensions": {"thickness": criticism.Extension(POSITIVE)}}, "thickness"),
         ({"earlier": ({"thickness": [0.5]}, np.zeros((1, 30)))}, "earlier"),

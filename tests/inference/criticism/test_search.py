@@ -57,6 +57,14 @@ def experiment(simulate=oscillate, seed=0, label="fitted", **truth):
     return criticism.Experiment(simulate, observed, NOISE, label, label, WINDOWS)
 
 
+@pytest.mark.parametrize(("drift", "verdict"), [(0.0, "none"), (0.3, "unknown")])
+def test_without_effects_to_look_for_a_model_is_only_tested(drift, verdict):
+    held_back = [held_out(drift=drift)]
+    found = criticism.criticise(experiment(drift=drift), PRIOR, {}, held_out=held_back, plan=PLAN)
+    assert found.verdict.kind == verdict
+    assert not found.candidates and found.confusion.shape == (0, 0)
+
+
 class Counted:
     """A simulator that counts its runs."""
 
