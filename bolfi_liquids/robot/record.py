@@ -33,12 +33,13 @@ if TYPE_CHECKING:
     from ..hardware.motion import PosePath
 
 
-def record(
+def record(  # noqa: PLR0913  an option each
     rig: "Rig | str | Path | None" = None,
     *,
     out: str | Path,
     ask: Ask | None = None,
     emulate: "HiddenLiquid | bool" = False,
+    motion: str | Path | None = None,
     cycles: int | None = None,
     progress: bool = True,
 ) -> Recording:
@@ -53,7 +54,9 @@ def record(
         ask: Shows a person the plan, returns what the person typed.
         emulate: Use an emulated arm and rendered cameras, which look at this liquid; True takes
             one of 1 Pa s.
-        cycles: How often the pattern is repeated; None as in the rig's file.
+        motion: A file of fields of [stirring] that take the place of the rig's, such as the
+            RUN/next_stir.toml of a criticism.
+        cycles: How often the pattern is repeated; None as in these files.
         progress: Whether to show a live view on stderr, if that is a terminal.
 
     Returns:
@@ -71,7 +74,7 @@ def record(
         view.until_done(number)
         return False
 
-    stir = prepare_stir(rig, out, ask, emulate, cycles)
+    stir = prepare_stir(rig_of(rig, motion), out, ask, emulate, cycles)
     return carried_out(stir, wait, stir.task.tool, progress=progress)
 
 

@@ -14,8 +14,9 @@ from ..prior import Prior, checked_prior
 from ..simulations.bank import SimulationBank
 from ..simulations.compute import Workers, open_compute
 from ..simulations.job import BATCH
+from .design import Suggestion, rivals_of, suggest
 from .experiment import Experiment, Extensions, Proposal, check_extensions
-from .held_out import Gap, Suggestion, gap, holds, suggest
+from .held_out import Gap, gap, holds
 from .hypothesis import Hypothesis, Interval, Weighted, weighted_posterior
 from .misfit import Found, confusion, locate, null_draws
 from .search import Base, examine, explain
@@ -209,8 +210,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
             candidates, members = _explanations(study, base, accept, held_out)
         verdict = conclude(base.check, members, level)
         rivals = _rivals(verdict, candidates, members)
-        best = {" with ".join(one.names): one.hypothesis.best for one in rivals}
-        suggestions = suggest(study, proposals, best)
+        suggestions = suggest(study, proposals, rivals_of(rivals, seed)) if proposals else []
     named = verdict.effects if verdict.kind is VerdictKind.EFFECT else ()
     accepted = tuple(accept) if accept is not None else named
     leading = _among(candidates, accepted)

@@ -12,7 +12,6 @@ from bolfi_liquids.calibration.stirs import (
     camera_noise,
     held_out_noise,
     stir_experiment,
-    stir_proposals,
     windows,
 )
 from bolfi_liquids.errors import InputError
@@ -96,22 +95,6 @@ def test_clean_recordings_of_the_same_path_say_where_it_errs(stirred, rng):
     assert [type(part).__name__ for part in noise.parts] == ["AutoregressiveNoise", "ModelError"]
     assert usual_for(stirring, [], 0.5) is None
     assert stir_experiment(stirring, cameras, None, "stir").noise is cameras
-
-
-def test_proposed_stirs_stay_within_the_cup_and_below_the_limit_of_speed(stirred, rng):
-    gripper, factor = stirred.gripper, np.array([1.5, 1.5, 1.0])  # a path beyond the cup
-    wide = replace(stirred, gripper=Trajectory(gripper.time, factor * gripper.position))
-    stirring = stir_simulator([noisy(wide, rng)], 200)
-    made = stir_proposals(stirring, camera_noise(stirring.recordings), None)
-    assert len({one.label for one in made}) == len({one.identity for one in made}) == len(made) == 4
-    cup, stick = stirring.setups[0].cup, stirring.setups[0].stick
-    for one in made:
-        (plan,) = one.simulate.simulate.__self__.recordings
-        path = plan.gripper.position[:, :2]
-        assert np.linalg.norm(path, axis=1).max() < cup.radius - stick.radius
-        assert one.shape == plan.inclination.shape
-        step = np.linalg.norm(np.diff(path, axis=0), axis=1) / np.diff(plan.gripper.time)
-        assert step.max() < 0.21
 
 
 def test_liquids_are_as_far_apart_as_their_viscosities():
