@@ -164,7 +164,7 @@ def design(run: RunArgument, compute: ComputeOptions) -> None:
     RUN/next_stir.toml gets its motion, for `record --motion`. If an effect is missing, `criticise`
     finds the stir that tells which.
     """
-    from ..next_stir.design import design_stir
+    from ..next_stir import design_stir
 
     with compute.arguments() as where:
         printed.print_next_stir(design_stir(run, **where))

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..criticism.result import Criticism
     from ..hardware import Check
     from ..inputs.recording import Recording
-    from ..next_stir.design import NextStir
+    from ..next_stir import NextStir
     from ..pouring.result import Pour
     from ..reporting.warnings import Results
 

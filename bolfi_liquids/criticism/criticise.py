@@ -21,7 +21,7 @@ from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import Pours, PourTable
 from ..inputs.recording import Recording
 from ..inputs.settings import CriticismSettings
-from ..next_stir.motions import keep_motion, stir_proposals
+from ..motions import keep_motion, stir_proposals
 from ..progress import phases
 from ..run.compute import open_compute
 from ..run.given_pours import keep_pours

@@ -15,7 +15,7 @@ from ..errors import Argument, InputError
 from ..inputs.pour_table import Pours, PourTable, check_scene, table_and_cups, table_of
 from ..inputs.recording import Recording
 from ..inputs.settings import FALSE_ALARM_RATE, CriticismSettings
-from ..next_stir.motions import Motion, family
+from ..motions import Motion, family
 from ..simulators import StirSimulator, stir_simulator
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from ..calibration.summary import ParameterSummary
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..inputs.frame import named_faults
 from ..inputs.settings import FALSE_ALARM_RATE
-from ..next_stir.motions import Motion
+from ..motions import Motion
 from ..run.results import Number, Section
 from .criticism_file import best_of
 

@@ -33,13 +33,12 @@ if TYPE_CHECKING:
     from ..hardware.motion import PosePath
 
 
-def record(  # noqa: PLR0913  an option each
+def record(
     rig: "Rig | str | Path | None" = None,
     *,
     out: str | Path,
     ask: Ask | None = None,
     emulate: "HiddenLiquid | bool" = False,
-    motion: str | Path | None = None,
     cycles: int | None = None,
     progress: bool = True,
 ) -> Recording:
@@ -49,14 +48,13 @@ def record(  # noqa: PLR0913  an option each
     and all of it is emulated. Whatever stops it, what was recorded until then is kept in `out`.
 
     Args:
-        rig: What is there, or its file; None is the bundled one.
+        rig: What is there, or its file; None is the bundled one. `hardware.with_motion` gives it
+            the motion of a RUN/next_stir.toml.
         out: Directory of the recording; new or empty.
         ask: Shows a person the plan, returns what the person typed.
         emulate: Use an emulated arm and rendered cameras, which look at this liquid; True takes
             one of 1 Pa s.
-        motion: A file of fields of [stirring] that take the place of the rig's, such as the
-            RUN/next_stir.toml of a criticism.
-        cycles: How often the pattern is repeated; None as in these files.
+        cycles: How often the pattern is repeated; None as in the rig's file.
         progress: Whether to show a live view on stderr, if that is a terminal.
 
     Returns:
@@ -74,7 +72,7 @@ def record(  # noqa: PLR0913  an option each
         view.until_done(number)
         return False
 
-    stir = prepare_stir(rig_of(rig, motion), out, ask, emulate, cycles)
+    stir = prepare_stir(rig, out, ask, emulate, cycles)
     return carried_out(stir, wait, stir.task.tool, progress=progress)
 
 

@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..calibration.model_error import model_error, noise_beside
-from ..calibration.stirs import camera_noise, stir_experiment
-from ..criticism.result import calibration_to_pour
-from ..inputs.settings import CriticismSettings
-from ..progress import phases
-from ..run.compute import open_compute
-from ..run.run import Run, RunOrPath
-from ..seeds import Phase, generator
-from ..simulators import StirSimulator, stir_simulator
+from .calibration.model_error import model_error, noise_beside
+from .calibration.stirs import camera_noise, stir_experiment
+from .criticism.result import calibration_to_pour
+from .inputs.settings import CriticismSettings
 from .motions import FILE, Motion, family, keep_motion, planned
+from .progress import phases
+from .run.compute import open_compute
+from .run.run import Run, RunOrPath
+from .seeds import Phase, generator
+from .simulators import StirSimulator, stir_simulator
 
 if TYPE_CHECKING:
-    from ..inference.criticism import Proposal
-    from ..inference.criticism.design import Rival
-    from ..inference.simulations import Workers
+    from .inference.criticism import Proposal
+    from .inference.criticism.design import Rival
+    from .inference.simulations import Workers
 
 MOTIONS = 8
 """That are considered, beside the first recording's own."""
@@ -72,8 +72,8 @@ def design_stir(
         InputError: There is no such run, or another command works in it.
         RuntimeError: No stir of the family could be simulated.
     """
-    from ..inference.criticism.design import remaining_sd, suggest
-    from ..inference.criticism.study import Study
+    from .inference.criticism.design import remaining_sd, suggest
+    from .inference.criticism.study import Study
 
     with Run.entered(calibration) as run, open_compute(executor, timeout) as compute:
         known = calibration_to_pour(run)
@@ -103,7 +103,7 @@ def _proposals(
     stirring: StirSimulator, motions: Sequence[Motion], viscosity: float
 ) -> "Iterator[Proposal]":
     """The recorded stir again, and the motions; the simulator errs in the rhythm of each."""
-    from ..inference.criticism import Proposal
+    from .inference.criticism import Proposal
 
     plans = {AGAIN: stirring} | {motion.label: planned(stirring, motion) for motion in motions}
     for label, plan in plans.items():
@@ -117,7 +117,7 @@ def _rivals(
 ) -> "dict[str, Rival]":
     """A thin and a thick liquid about a viscosity [Pa s], so far apart in its log; what else is
     unknown is the median, then as drawn."""
-    from ..inference.criticism.design import RIVAL_DRAWS, Rival
+    from .inference.criticism.design import RIVAL_DRAWS, Rival
 
     rng = generator(seed, Phase.POSTERIOR_DRAWS)
     rows = rng.integers(len(posterior["viscosity"]), size=RIVAL_DRAWS - 1)

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import tomli_w
 
-from ..files import write_text
-from ..inputs.recording import planned_recording
-from ..inputs.strokes import resting, speed
-from ..simulators import StirSimulator
+from .files import write_text
+from .inputs.recording import planned_recording
+from .inputs.strokes import resting, speed
+from .simulators import StirSimulator
 
 if TYPE_CHECKING:
-    from ..hardware.motion import Trajectory
-    from ..inference.criticism import Noise, Proposal
+    from .hardware.motion import Trajectory
+    from .inference.criticism import Noise, Proposal
 
 FILE = "next_stir.toml"
 """In RUN."""
@@ -61,7 +61,7 @@ class Motion:
     @property
     def path(self) -> "Trajectory":
         """Of the gripper, thirty times a second."""
-        from ..hardware.motion import circle, star
+        from .hardware.motion import circle, star
 
         if self.pattern == "circle":
             return circle(speed=self.speed, height=self.height, radius=self.radius, rest=REST)
@@ -87,7 +87,7 @@ def family(stirring: "StirSimulator", count: int) -> list[Motion]:
     They go no farther from the axis than the recording, and within the speed and acceleration that
     a rig's file allows if it states no limits.
     """
-    from ..inference.sobol import sobol
+    from .inference.sobol import sobol
 
     recording, setup = stirring.recordings[0], stirring.setups[0]
     position, moves = recording.gripper.position, recording.time[~resting(recording)]
@@ -132,7 +132,7 @@ def stir_proposals(
         motions: Of the gripper.
         noise: Of the cameras, and the simulator's usual residual on other paths if it is known.
     """
-    from ..inference.criticism import Proposal
+    from .inference.criticism import Proposal
 
     made = []
     for motion in motions:

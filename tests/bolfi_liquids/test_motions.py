@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 import bolfi_liquids as bl
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.rigs import rig_of
-from bolfi_liquids.next_stir.motions import (
+from bolfi_liquids.motions import (
     ACCELERATION,
     FILE,
     MAX_SPEED,
