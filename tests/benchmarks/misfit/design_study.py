@@ -3,7 +3,8 @@
     python tests/benchmarks/misfit/design_study.py --out design.jsonl --ties 40
 
 An effect is hidden at a size at which the first star leaves a tie with another. Then the proposed
-stir is made, one drawn from the same family, and the same star again; each is held out in turn.
+stir is made, one drawn from the same family, and the same star again; each is held out in turn, and
+each is fitted together with the first.
 Each line of the file is one data set; a study that was interrupted goes on where it stopped.
 """
 
@@ -11,7 +12,7 @@ import argparse
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from itertools import count
 from pathlib import Path
 
@@ -29,12 +30,14 @@ from stand_in import DURATION, EXTENSIONS, PRIOR, REST, SUBSTEPS, Stir
 
 MOVES = int(REST * 30)  # the first sample of which the gripper moves
 TREND = 2  # degree of what noise at rest is told from, as for recordings
-HIDDEN = ("friction", "wall", "tilt", "delay", "drift", "gripper_scale")
+MOST_ALIKE = 10  # ties in which one effect is hidden
+MIN_LIKENESS = 0.6  # cosine of the hidden effect's signature and another's on the first star
 SNRS = (4.0, 7.0)  # of the hidden effect, by the true covariance
 TRIES = 60  # of the noise, until a linear analysis expects a tie
 MIN_GAIN, TIE_GAIN = 8.0, 2.0  # log likelihood of the best, and by which another is behind
 FAMILY = 8  # motions that are proposed
 ARMS = ("proposed", "drawn", "same again")
+HELD_OUT, FITTED = "held out", "fitted too"
 
 
 @dataclass(frozen=True)
@@ -87,12 +90,11 @@ def white(signals: np.ndarray) -> np.ndarray:
     return np.linalg.solve(factor, signals).reshape(len(signals), -1)
 
 
-def data_set(number: int) -> dict | None:
+def data_set(number: int, effect: str) -> dict | None:
     """Motion, truth and data of a set of which a linear analysis expects a tie with the hidden
     effect; None where there is none."""
     rng = np.random.default_rng([number, 7])
-    effect = HIDDEN[number % len(HIDDEN)]
-    first = Motion(9, rng.uniform(0.01, 0.025), rng.uniform(0.03, 0.1))
+    first = Motion(9, rng.uniform(0.01, 0.025), rng.uniform(0.03, 0.15))
     base = {"drag": float(np.exp(rng.uniform(*np.log([0.8, 5.0])))), "eddy": rng.uniform(0.1, 0.5)}
     sizes = {name: float(one.prior.icdf(0.6)) for name, one in EXTENSIONS.items()}
     at = [base, base | {"drag": 1.05 * base["drag"]}, base | {"eddy": base["eddy"] + 0.02}]
@@ -111,12 +113,17 @@ def data_set(number: int) -> dict | None:
     truth = base | {effect: coefficient}
     clean, (unmoved,) = exact(first, [base, truth])[1], exact(first, [base])
     (moved,) = white(clean[None] - unmoved)
-    if abs(coefficient) > most or not SNRS[0] < np.linalg.norm(visible(moved)) < SNRS[1]:
+    unit = {name: of / np.linalg.norm(of) for name, of in signature.items()}
+    likeness = max(abs(unit[effect] @ of) for name, of in unit.items() if name != effect)
+    taken = base["eddy"] + 0.02 * np.linalg.lstsq(changed[:2].T, moved, rcond=None)[0][1]
+    if likeness < MIN_LIKENESS or abs(coefficient) > most or not 0.0 < taken < 0.6:
+        return None
+    if not SNRS[0] < np.linalg.norm(visible(moved)) < SNRS[1]:
         return None
     for seed in range(TRIES * number, TRIES * (number + 1)):
         observed = observe(first, clean, seed)
         (left,) = visible(white(observed[None] - unmoved))
-        score = {name: of @ left / np.linalg.norm(of) for name, of in signature.items()}
+        score = {name: of @ left for name, of in unit.items()}
         gain = {n: max(z, 0.0 if one_sided[n] else -z) ** 2 / 2.0 for n, z in score.items()}
         best = max(gain.values())
         near = [name for name, value in gain.items() if value > best - TIE_GAIN]
@@ -137,28 +144,32 @@ def observe(stir: Stir, clean: np.ndarray, seed: int) -> np.ndarray:
     return clean + stir._jitter(seed, {}) + noise
 
 
-def examine(number: int) -> dict | None:
+def simulate_both(first: Stir, second: Stir, theta: dict, seeds: np.ndarray) -> np.ndarray:
+    """Two stirs of one liquid, joined along time [b, 480, 2]; their errors are independent."""
+    later = second.simulate(theta, np.asarray(seeds) + 2**31)
+    return np.concatenate([first.simulate(theta, seeds), later], axis=1)
+
+
+def examine(number: int, effect: str) -> dict | None:
     """Criticise a data set, and where it leaves a tie make each arm's experiment."""
-    made = data_set(number)
+    made = data_set(number, effect)
     if made is None:
         return None
     first, truth, bank = made["first"], made["truth"], SimulationBank(":memory:")
     motions = {motion.label: motion for motion in family()}
     noise = criticism.rest_noise([made["observed"][:MOVES]], seed=number, trend=TREND)
 
-    def criticised(**more) -> criticism.Criticism:
-        experiment = criticism.Experiment(
-            first.simulate, made["observed"], noise, first.label, "star"
-        )
-        return criticism.criticise(
-            experiment, PRIOR, EXTENSIONS, seed=number, batch=64, bank=bank, **more
-        )
+    star = criticism.Experiment(first.simulate, made["observed"], noise, first.label, "star")
+
+    def criticised(experiment: criticism.Experiment, **more) -> criticism.Criticism:
+        how = {"seed": number, "batch": 64, "bank": bank}
+        return criticism.criticise(experiment, PRIOR, EXTENSIONS, **how, **more)
 
     proposals = [
         criticism.Proposal(one.simulate, noise, (240, 2), label, label, DURATION)
         for label, one in motions.items()
     ]
-    found = criticised(proposals=proposals)
+    found = criticised(star, proposals=proposals)
     result = {"number": number, "effect": made["effect"], "verdict": str(found.verdict.kind)}
     result |= {"tied": list(map(list, found.tied)), "simulations": found.simulations}
     if found.verdict.kind != "tie" or (made["effect"],) not in found.tied:
@@ -171,29 +182,36 @@ def examine(number: int) -> dict | None:
         seen = observe(motion, exact(motion, [truth])[0], 10_000_000 + number)
         rests = [seen[:MOVES], made["observed"][:MOVES]]
         noise_there = criticism.rest_noise(rests, seed=number, trend=TREND)
-        again = criticism.Experiment(
-            motion.simulate, seen, noise_there, f"{motion.label} {arm}", arm
+        label = f"{motion.label} {arm}"
+        again = criticism.Experiment(motion.simulate, seen, noise_there, label, arm)
+        both = criticism.Experiment(
+            partial(simulate_both, first, motion),
+            np.concatenate([made["observed"], seen]),
+            noise_there,
+            f"{first.label} and {label}",
         )
-        verdict = criticised(held_out=[again]).verdict
-        result[arm] = [str(verdict.kind), list(verdict.effects), motion.label]
+        ways = {HELD_OUT: criticised(star, held_out=[again]), FITTED: criticised(both)}
+        for way, found in ways.items():
+            verdict = found.verdict
+            result[f"{arm}, {way}"] = [str(verdict.kind), list(verdict.effects), motion.label]
     return result
 
 
 def right(result: Mapping, arm: str) -> bool:
-    """Whether the hidden effect alone was named."""
+    """Whether the hidden effect alone was named, of an arm and a way."""
     return result[arm][:2] == ["effect", [result["effect"]]]
 
 
 def table(found: list[dict]) -> str:
     """What each arm's experiment led to, in Markdown."""
-    ties = [one for one in found if "proposed" in one]
+    ties = [one for one in found if "suggested" in one]
     rows = [
         f"{len(ties)} ties",
         "",
         "| stir | right | still tied | unknown | wrong |",
         "|-|-|-|-|-|",
     ]
-    for arm in ARMS:
+    for arm in (f"{arm}, {way}" for way in (HELD_OUT, FITTED) for arm in ARMS):
         kinds = ["right" if right(one, arm) else one[arm][0] for one in ties]
         shares = [np.mean([kind == of for kind in kinds]) for of in ("right", "tie", "unknown")]
         shares.append(np.mean([kind in ("effect", "none") for kind in kinds]))
@@ -211,10 +229,13 @@ if __name__ == "__main__":
     parser.add_argument("--out", type=Path, default=Path("design.jsonl"))
     parser.add_argument("--ties", type=int, default=40)
     asked = parser.parse_args()
-    known = results(asked.out)
-    for number in count(max((one["number"] for one in known), default=-1) + 1):
-        if sum("proposed" in one for one in results(asked.out)) >= asked.ties:
+    done = results(asked.out)
+    for number in count(max((one["number"] for one in done), default=-1) + 1):
+        ties = [one["effect"] for one in done if "suggested" in one]
+        effect = tuple(EXTENSIONS)[number % len(EXTENSIONS)]
+        if len(ties) >= asked.ties:
             break
-        if (result := examine(number)) is not None:
+        if ties.count(effect) < MOST_ALIKE and (result := examine(number, effect)) is not None:
             keep(asked.out, result)
+            done.append(result)
     print(table(results(asked.out)))
