@@ -95,7 +95,8 @@ def _simulated(
 ) -> np.ndarray:
     """Runs [rivals, n, values] of those draws that can be simulated for each of the rivals."""
     thetas = [{name: of[draws] for name, of in one.theta.items()} for one in rivals.values()]
-    made = study.run_each(f"next {proposal.label} {draws.start}", thetas, proposal)
+    phase = "next experiment, again" if draws.start else "next experiment"
+    made = study.run_each(phase, thetas, proposal)
     common = set.intersection(*(set(runs.seeds.tolist()) for runs in made))
     rows = [[seed in common for seed in runs.seeds.tolist()] for runs in made]
     values = int(np.prod(proposal.shape))
