@@ -11,6 +11,8 @@ from .inputs.pour_table import open_pours as open_pours
 from .inputs.recording import Recording as Recording
 from .inputs.table_import import import_table as import_table
 from .models import Cups as Cups
+from .next_stir import NextStir as NextStir
+from .next_stir import design_stir as design_stir
 from .pouring.choose import choose_pour as choose_pour
 from .pouring.result import Pour as Pour
 from .reporting.report import report as report

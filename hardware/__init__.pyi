@@ -14,6 +14,7 @@ from .rig import Camera as Camera
 from .rig import Rig as Rig
 from .rig_file import bundled_rig as bundled_rig
 from .rig_file import open_rig as open_rig
+from .rig_file import with_motion as with_motion
 from .robot.ur import URController as URController
 from .safety.limits import check_path as check_path
 from .safety.preflight import Check as Check

@@ -192,7 +192,7 @@ class StirringSettings(RigSection, frozen=True):
     """The plan of a stir, in the cup's frame.
 
     Attributes:
-        points: Vertices of the star, an odd number ("To Stir or Not to Stir": 9).
+        points: Vertices of the star, an odd number ("To Stir or Not to Stir": 9); 2 are of a line.
         radius: Of their circle [m].
         speed: Greatest along a stroke [m/s].
         acceleration: At its ends [m/s2].
@@ -200,12 +200,13 @@ class StirringSettings(RigSection, frozen=True):
         clear_height: Of the pivot where the stick is out of the cup [m].
         approach_speed: Down into the cup and out of it [m/s].
         rest: Time at rest before and after [s]; the cameras' noise is learned from it.
+        pause: Time at rest at each vertex [s].
         cycles: Stars in a recording.
     """
 
     pattern: Literal["star", "circle"] = "star"
     points: Annotated[
-        int, Within(5, 99, "vertices", "fewer make no star, nor does an even number")
+        int, Within(2, 99, "vertices", "fewer make no line, and no robot follows more")
     ] = 9
     radius: Annotated[
         float, Within(0.005, 0.15, "m", "a smaller star moves no liquid, a larger one fits no cup")
@@ -218,14 +219,15 @@ class StirringSettings(RigSection, frozen=True):
     rest: Annotated[
         float, Within(0.1, 60.0, "s", "the cameras' noise is learned from some pictures")
     ] = 2.0
+    pause: Annotated[float, Within(0.0, 60.0, "s", "the liquid is at rest long before")] = 0.0
     cycles: Annotated[int, Within(1, MAX_CYCLES, "times", "so often a pattern is stirred")] = 1
 
     @field_validator("points")
     @classmethod
     def _is_odd(cls, points: int, info: ValidationInfo) -> int:
-        if info.context == CHECK_ENDS and points % 2 == 0:
+        if info.context == CHECK_ENDS and points % 2 == 0 and points != 2:
             raise ValueError(
-                f"{points} is even: all strokes would lie on one line; give an odd number"
+                f"{points} is even: strokes would miss vertices; give an odd number, or 2 of a line"
             )
         return points
 

@@ -54,15 +54,27 @@ def open_rig(path: str | Path) -> Rig:
     Raises:
         RigError: The file is missing or cannot be used; the message names the fields.
     """
-    path = Path(path)
+    return _beside(_checked(_read(path, BUNDLED), str(path)), Path(path).parent)
+
+
+def with_motion(rig: Rig, path: str | Path) -> Rig:
+    """A rig that stirs as a motion file says: fields of [stirring], in the place of the rig's own.
+
+    Raises:
+        RigError: The file is missing or cannot be used, or the rig does not allow that motion.
+    """
+    stirring = rig.stirring.model_dump() | _read(path, "motion file")
+    return _checked(rig.model_dump() | {"stirring": stirring}, str(path))
+
+
+def _read(path: str | Path, kind: str) -> dict[str, Any]:
     try:
-        written = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except (OSError, UnicodeDecodeError) as err:
         what = getattr(err, "strerror", None) or "not a text file"
-        raise RigError(what, where=str(path), fix="give the path of a rig.toml") from err
+        raise RigError(what, where=str(path), fix=f"give the path of a {kind}") from err
     except tomllib.TOMLDecodeError as err:
         raise RigError(f"not TOML: {err}", where=str(path), fix="correct that line") from err
-    return _beside(_checked(written, str(path)), path.parent)
 
 
 def bundled_rig() -> Rig:

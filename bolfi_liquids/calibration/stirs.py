@@ -1,13 +1,13 @@
 """Stirred recordings as experiments that the engine can criticise, and the noise in them."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..inputs.recording import PLANE_NAMES, Recording, planned_recording
+from ..inputs.recording import PLANE_NAMES, Recording
 from ..inputs.strokes import resting, speed, strokes
 from ..simulators import StirSimulator
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
         Extension,
         ModelError,
         Noise,
-        Proposal,
         Window,
     )
 
@@ -37,15 +36,6 @@ RATE_TOLERANCE = 0.02
 
 SPEED_BINS = 3
 """Stretches of like speed that a stir is cut into, beside its strokes."""
-
-FASTER_FACTOR, SLOWER_FACTOR = 1.6, 0.5
-"""Speeds of proposed stirs, relative to the recording's."""
-
-MAX_SPEED = 0.2
-"""Of a proposed stir [m/s]."""
-
-MAX_RADIUS_SHARE = 0.8
-"""Of the way from the axis to the wall that the stick may go."""
 
 DIFFERENCE_ORDER = 3
 """Of the differences that leave the noise of a smooth signal."""
@@ -112,49 +102,14 @@ def stir_experiment(
     return Experiment(
         stirring.batched,
         stirring.observed,
-        _beside(cameras, usual),
+        with_model_error(cameras, usual),
         stirring.identity,
         label,
         windows(stirring),
     )
 
 
-def stir_proposals(
-    stirring: StirSimulator, cameras: "AutoregressiveNoise", usual: "ModelError | None"
-) -> list["Proposal"]:
-    """The first recording's rig on other paths, seen with the same cameras' noise.
-
-    Args:
-        stirring: What was recorded.
-        cameras: Their noise.
-        usual: The simulator's usual residual on other paths, if it is known.
-    """
-    from ..hardware.motion import circle, star
-    from ..inference.criticism import Proposal
-
-    recording, setup = stirring.recordings[0], stirring.setups[0]
-    fast = float(np.quantile(speed(recording), 0.95))
-    faster, slower = min(FASTER_FACTOR * fast, MAX_SPEED), SLOWER_FACTOR * fast
-    position, height = recording.gripper.position[:, :2], float(recording.gripper.position[0, 2])
-    most = MAX_RADIUS_SHARE * (setup.cup.radius - setup.stick.radius)
-    radius = min(max(float(np.linalg.norm(position, axis=1).max()), 0.01), most)
-    at: dict[str, Any] = {"height": height, "radius": radius}
-    near = at | {"radius": 0.8 * radius}
-    paths = {
-        f"the star at {100 * faster:.0f} cm/s": star(speed=faster, **at),
-        f"the star at {100 * slower:.0f} cm/s": star(speed=slower, **at),
-        f"a star of 7 points at {100 * fast:.0f} cm/s": star(speed=fast, points=7, **near),
-        f"four circles at {100 * fast:.0f} cm/s": circle(speed=fast, **near),
-    }
-    noise, made = _beside(cameras, usual), []
-    for label, path in paths.items():
-        plan = planned_recording(path.time, path.position, recording.attrs)
-        own, shape = StirSimulator((plan,), (setup,)), (len(path.time), len(PLANE_NAMES))
-        made.append(Proposal(own.batched, noise, shape, own.identity, label))
-    return made
-
-
-def _beside(cameras: "AutoregressiveNoise", usual: "ModelError | None") -> "Noise":
+def with_model_error(cameras: "AutoregressiveNoise", usual: "ModelError | None") -> "Noise":
     """The cameras' noise and, where it is known, the simulator's usual residual."""
     from ..inference.criticism import SumOfNoises
 

@@ -191,6 +191,20 @@ def criticise(  # noqa: PLR0913  an option each
     printed.print_next_pour(criticism.calibration)
 
 
+@app.command(epilog=examples("design runs/mine"))
+@grouped
+def design(run: RunArgument, compute: ComputeOptions) -> None:
+    """Find the next stir that tells most of the liquid.
+
+    RUN/next_stir.toml gets its motion, for `record --motion`. If an effect is missing, `criticise`
+    finds the stir that tells which.
+    """
+    from ..next_stir import design_stir
+
+    with compute.arguments() as where:
+        printed.print_next_stir(design_stir(run, **where))
+
+
 @app.command(
     epilog=examples(
         "pour runs/mine --cups cups.toml",

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ..criticism.result import Criticism
     from ..hardware import Check
     from ..inputs.recording import Recording
+    from ..next_stir import NextStir
     from ..pouring.result import Pour
     from ..reporting.warnings import Results
 
@@ -106,6 +107,16 @@ def print_findings(criticism: "Criticism") -> None:
     parts = (*parts, "poured", "next")
     told = [part for part in parts if part not in of_what_there_is or facts[of_what_there_is[part]]]
     _print_prose(told, {"criticism": facts})
+
+
+def print_next_stir(found: "NextStir") -> None:
+    """What to stir, and what that is expected to tell."""
+    _print(
+        f"next stir: {found.label} ({found.cost:.0f} s). The sd of the viscosity's log is expected "
+        f"to fall from {found.sd_before:.3f} to {found.sd_after:.3f}."
+    )
+    if found.motion is not None:
+        print_next(command("record", "--motion", found.motion, "--out", "DIR"))
 
 
 def print_warnings(results: "Results") -> None:

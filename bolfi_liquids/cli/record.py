@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 EPILOG = examples(
     "record --emulator --out runs/stir",
     "record --rig rig.toml --out runs/stir --arm",
+    "record --emulator --motion runs/mine/next_stir.toml --out runs/next",
 )
 
 
@@ -47,8 +48,12 @@ def record(  # noqa: PLR0913  an option each
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Directory of the recording; new or empty.")
     ] = Path("runs/recording"),
+    motion: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Fields of [stirring] that take the place of the rig's."),
+    ] = None,
     cycles: Annotated[
-        int | None, typer.Option(help="How often the star is stirred; else as in rig.toml.")
+        int | None, typer.Option(help="How often the star is stirred; else as in these files.")
     ] = None,
 ) -> None:
     """Stir, and record it. A dry run unless armed: it plans, checks everything, moves nothing.
@@ -64,7 +69,7 @@ def record(  # noqa: PLR0913  an option each
     check_one(ctx, "--arm", "--emulator")
     check_needed(ctx, "--emulator", "--viscosity")
     check_needed(ctx, "--calibrate", "--cups", "--target")
-    opened = rig_of(rig)
+    opened = rig_of(rig, motion)
     if not (arm or emulator):
         _tell_dry(*dry_stir(opened, cycles, out))
         return

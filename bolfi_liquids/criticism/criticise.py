@@ -14,7 +14,7 @@ from ..calibration.stirs import (
     effects_of,
     held_out_noise,
     stir_experiment,
-    stir_proposals,
+    with_model_error,
 )
 from ..errors import Argument
 from ..inputs.frame import recording_warnings
@@ -22,6 +22,7 @@ from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import Pours, PourTable
 from ..inputs.recording import Recording
 from ..inputs.settings import CriticismSettings
+from ..motions import keep_motion, stir_proposals
 from ..progress import phases
 from ..run.compute import open_compute
 from ..run.given_pours import keep_pours
@@ -108,6 +109,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
                 keep_pours(run.path, inputs.table, inputs.cups)
             if (finished := Criticism.of(run)) and finished.made_from == inputs.made_from:
                 run.write_summary()
+                keep_motion(run.path, finished.summary.next_motion)
                 return finished
             with run.bank() as bank, phases(shown=progress) as report:
                 own = replace(compute, batch=settings.batch, bank=bank)
@@ -116,6 +118,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         seconds = time.perf_counter() - started
         summary = CriticismSummary.of(inputs, found, clean_runs, tree, seconds)
         run.keep("criticise", tree, inputs.made_from, summary.to_json())
+        keep_motion(run.path, summary.next_motion)
         return Criticism.made(base, tree)
 
 
@@ -160,14 +163,17 @@ def _stirs(
         noise = held_out_noise(recording, stirring.recordings)
         return experiment(own, noise, recording.path.name)
 
-    elsewhere = model_error(stirring, viscosity, clean, elsewhere=True)
+    elsewhere = with_model_error(cameras, model_error(stirring, viscosity, clean, elsewhere=True))
     return inference.criticism.criticise(
         experiment(stirring, cameras, "stir"),
         calibration.prior,
         extensions,
         earlier=calibration.learned_from,
         held_out=[held_out(one) for one in inputs.held_out],
-        proposals=stir_proposals(stirring, cameras, elsewhere),
+        proposals=[
+            *stir_proposals(stirring, inputs.motions, elsewhere),
+            *pour_proposals(inputs.cups, inputs.density)[:1],
+        ],
         accept=_among(settings.accept, extensions),
         plan=settings.stir_plan,
         **how,

@@ -10,7 +10,8 @@ Its groups, under `stirs` and, where pours were given, under `pours`:
 - `explanations`: over all of them, their probabilities;
 - `confusion`: cosines between the effects' signatures;
 - `held_out`: over explanations and recordings, the gap before and after;
-- `suggestions`: over further experiments, how well each would separate the explanations.
+- `suggestions`: over further experiments, how well each would separate the explanations, the rate
+  of wrong names before and after it, and its cost.
 
 `posterior` holds the draws of the extended model, or of the base model where there is none.
 """
@@ -38,6 +39,14 @@ ANGLE, DIMENSIONLESS = {"units": "rad"}, {"units": "1"}
 
 LABELS: dict[type, Any] = {str: "", int: -1, float: float("nan")}
 """Value of a label that a window does not have."""
+
+SUGGESTED = {
+    "snr": ("snr", DIMENSIONLESS),
+    "wrong_before": ("before", DIMENSIONLESS),
+    "wrong_after": ("error", DIMENSIONLESS),
+    "cost": ("cost", {"units": "s"}),
+}
+"""Variables of further experiments: fields and units."""
 
 
 class EffectStatus(StrEnum):
@@ -106,10 +115,12 @@ def _groups(
     if source.gaps:
         groups["held_out"] = _held_out(source, units)
     if source.suggestions:
-        columns = {
-            "snr": ("experiment", [one.snr for one in source.suggestions]),
-            "between": ("experiment", [" or ".join(one.between) for one in source.suggestions]),
+        columns: dict[str, Any] = {
+            name: ("experiment", [getattr(one, field) for one in source.suggestions], unit)
+            for name, (field, unit) in SUGGESTED.items()
         }
+        between = [" or ".join(one.between) for one in source.suggestions]
+        columns["between"] = ("experiment", between)
         labels = [one.label for one in source.suggestions]
         groups["suggestions"] = Dataset(columns, coords={"experiment": labels})
     return groups

@@ -16,11 +16,15 @@ from ..errors import Argument, InputError
 from ..inputs.pour_table import Pours, PourTable, check_scene, table_and_cups, table_of
 from ..inputs.recording import Recording
 from ..inputs.settings import FALSE_ALARM_RATE, CriticismSettings
+from ..motions import Motion, family
 from ..simulators import StirSimulator, stir_simulator
 
 if TYPE_CHECKING:
     from ..inference.criticism import AutoregressiveNoise
     from ..models import Cups
+
+PROPOSED_STIRS = 7
+"""Motions that are considered as the next stir, beside a pour."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +69,11 @@ class Inputs:
     def cameras(self) -> "AutoregressiveNoise":
         """Their noise in the stirs."""
         return camera_noise(self.stirring.recordings)
+
+    @cached_property
+    def motions(self) -> list[Motion]:
+        """Stirs that could be made next."""
+        return family(self.stirring, PROPOSED_STIRS)
 
     @property
     def level(self) -> float:

@@ -153,7 +153,8 @@ def pour_proposals(cups: "Cups", density: float) -> list["Proposal"]:
         actions = Fractions(np.full(len(distance), rate), distance)
         pours = PourSimulator(cups, density, actions)
         label = f"pours at {np.degrees(rate):.0f} deg/s from {apart} cm"
-        made.append(Proposal(pours.batched, actions.noise, shape, pours.identity, label))
+        turning = cups.pour.final_angle / float(rate)
+        made.append(Proposal(pours.batched, actions.noise, shape, pours.identity, label, turning))
     return made
 
 

@@ -1,7 +1,7 @@
 """The section "criticise" of summary.json."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..calibration.summary import ParameterSummary
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..inputs.frame import named_faults
 from ..inputs.settings import FALSE_ALARM_RATE
+from ..motions import Motion
 from ..run.results import Number, Section
 from .criticism_file import best_of
 
@@ -202,11 +203,26 @@ class SuggestedExperiment:
         experiment: What to do.
         between: Explanations that it would separate least.
         snr: Expected signal-to-noise ratio of their difference.
+        wrong_before, wrong_after: Expected rate of wrong names, if the most probable explanation
+            is named now, and after the experiment.
+        cost_s: Duration of the stir or of the source's turn [s].
+        motion: Of a stir, as `record --motion` takes it.
     """
 
     experiment: str
     between: tuple[str, ...]
     snr: Number
+    wrong_before: Number
+    wrong_after: Number
+    cost_s: Number
+    motion: Mapping[str, Any] | None = None
+
+    @classmethod
+    def of(cls, one: "inference.criticism.Suggestion", motions: Sequence[Motion]) -> Self:
+        """From the engine's suggestion of one of these motions, or of a pour."""
+        planned = {motion.label: asdict(motion) for motion in motions}
+        motion = planned.get(one.label)
+        return cls(one.label, one.between, one.snr, one.before, one.error, one.cost, motion)
 
 
 @dataclass(frozen=True)
@@ -335,7 +351,7 @@ class CriticismSummary(Section):
             stirs=verdicts[0],
             pours=PourVerdict.of(sources["pours"]) if "pours" in sources else None,
             suggestions=tuple(
-                SuggestedExperiment(one.label, tuple(one.between), one.snr)
+                SuggestedExperiment.of(one, inputs.motions)
                 for source in given
                 for one in source.suggestions
             ),
@@ -355,6 +371,12 @@ class CriticismSummary(Section):
             if window["speed"] is None:
                 del window["speed"]
         return section
+
+    @property
+    def next_motion(self) -> Mapping[str, Any] | None:
+        """Of the best suggested stir, if a stir is suggested."""
+        stirs = [one for one in self.suggestions if one.motion is not None]
+        return min(stirs, key=lambda one: one.wrong_after).motion if stirs else None
 
     @property
     def considered(self) -> tuple[str, ...]:

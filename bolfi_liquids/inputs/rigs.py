@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..errors import Argument
+from ..files import as_path
 from .toml_file import opened
 
 if TYPE_CHECKING:
@@ -11,17 +13,24 @@ if TYPE_CHECKING:
 CURE = "a TOML file, or what hardware.open_rig returns"
 
 
-def rig_of(given: "Rig | str | Path | None") -> "Rig":
+def rig_of(given: "Rig | str | Path | None", motion: str | Path | None = None) -> "Rig":
     """A rig as it is, the rig of a file, or the bundled one for None.
+
+    Args:
+        given: The rig.
+        motion: A file of fields of [stirring] that take the place of the rig's.
 
     Raises:
         InputError: Something else was given.
-        RigError: The file or a number cannot be used.
+        RigError: A file or a number cannot be used, or the rig does not allow the motion.
     """
-    from ..hardware import Rig, bundled_rig, open_rig
+    from ..hardware import Rig, bundled_rig, open_rig, with_motion
     from ..hardware.rig_file import checked_rig
 
     if given is None:
-        return bundled_rig()
-    rig = opened(given, Rig, open_rig, "rig", "rig", CURE)
+        rig = bundled_rig()
+    else:
+        rig = opened(given, Rig, open_rig, "rig", "rig", CURE)
+    if motion is not None:
+        return with_motion(rig, as_path(motion, Argument("motion")))
     return checked_rig(rig) if rig is given else rig

@@ -205,8 +205,14 @@ def criticism_facts(criticism: Criticism) -> Facts:
         "held_out": held,
         "effects": {name: _effects(source) for name, source in sources.items()},
         "suggestions": [
-            vars(one) | {"snr": f"{one.snr:.1f}", "helps": one.snr >= DETECTABLE_SNR}
-            for one in sorted(summary.suggestions, key=lambda one: -one.snr)
+            vars(one)
+            | {"snr": f"{one.snr:.1f}", "helps": one.snr >= DETECTABLE_SNR}
+            | {"before": percent(one.wrong_before), "after": percent(one.wrong_after)}
+            | {
+                "cost": f"{one.cost_s:.0f} s",
+                "file": one.motion and one.motion == summary.next_motion,
+            }
+            for one in sorted(summary.suggestions, key=lambda one: (one.wrong_after, -one.snr))
         ],
         "noise": {
             "sd": degrees(summary.noise.sd_deg),

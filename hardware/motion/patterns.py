@@ -13,6 +13,8 @@ def star(  # noqa: PLR0913  a pattern has that many sizes
     points: int = 9,
     acceleration: float = 1.0,
     rest: float = 0.5,
+    pause: float = 0.0,
+    cycles: int = 1,
     rate: float = 30.0,
 ) -> Trajectory:
     """A star of straight strokes in a horizontal plane ("To Stir or Not to Stir": m = 9).
@@ -25,13 +27,16 @@ def star(  # noqa: PLR0913  a pattern has that many sizes
         speed: Greatest speed [m/s].
         height: Gripper above the cup's floor [m].
         radius: Of the circle of vertices [m].
-        points: Number of vertices, odd and at least 5.
+        points: Number of vertices, odd; or 2, of a line.
         acceleration: Of each stroke's ends [m/s²].
         rest: Time at rest before and after [s].
+        pause: Time at rest at each vertex [s].
+        cycles: How often all vertices are visited.
         rate: Samples per second.
 
     Raises:
-        ValueError: an argument is not positive and finite, or `points` is even or below 5.
+        ValueError: an argument is not positive and finite, `points` is no number of vertices, or
+            `pause` is negative.
     """
     check_positive(
         speed=speed,
@@ -39,36 +44,40 @@ def star(  # noqa: PLR0913  a pattern has that many sizes
         radius=radius,
         acceleration=acceleration,
         rest=rest,
+        cycles=cycles,
         rate=rate,
     )
-    corners = np.concatenate([np.zeros((1, 2)), star_vertices(points, radius)])
+    if not 0.0 <= pause < np.inf:
+        raise ValueError(f"pause must be finite and not negative, got {pause}")
+    vertices = star_vertices(points, radius)
+    corners = np.concatenate([np.zeros((1, 2)), vertices, *[vertices[1:]] * (int(cycles) - 1)])
 
     strokes = np.linalg.norm(np.diff(corners, axis=0), axis=1)
     # a short stroke never reaches the full speed
     peaks = np.minimum(speed, np.sqrt(strokes * acceleration))
     ramps = peaks / acceleration
     durations = strokes / peaks + ramps
-    ends = rest + np.concatenate([[0.0], np.cumsum(durations)])
+    starts = rest + np.concatenate([[0.0], np.cumsum(durations + pause)])
 
-    time = np.arange(0.0, ends[-1] + rest, 1.0 / rate)
-    k = np.clip(np.searchsorted(ends, time, side="right") - 1, 0, len(strokes) - 1)
-    elapsed = np.clip(time - ends[k], 0.0, durations[k])
+    time = np.arange(0.0, starts[-1] - pause + rest, 1.0 / rate)
+    k = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, len(strokes) - 1)
+    elapsed = np.clip(time - starts[k], 0.0, durations[k])
     share = travelled(elapsed, durations[k], ramps[k], peaks[k]) / strokes[k]
     plane = corners[k] + share[:, None] * (corners[k + 1] - corners[k])
     return Trajectory(time, np.column_stack([plane, np.full(len(time), height)]))
 
 
 def star_vertices(points: int, radius: float) -> np.ndarray:
-    """Vertices of a closed star in their order, the first one again at the end.
+    """Vertices of a closed star in their order, the first one again at the end; 2 are of a line.
 
     Returns:
         x and y [m], shape (points + 1, 2).
 
     Raises:
-        ValueError: `points` is below 5, or even, of which all strokes would lie on one line.
+        ValueError: `points` is below 2, or even and not 2: the strokes would miss vertices.
     """
-    if points < 5 or points % 2 == 0:
-        raise ValueError(f"points must be odd and at least 5, got {points}; the paper uses 9")
+    if points < 2 or (points % 2 == 0 and points != 2):
+        raise ValueError(f"points must be odd, or 2 for a line, got {points}; the paper uses 9")
     angles = 2.0 * np.pi * (points // 2) * np.arange(points + 1) / points
     return radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 

@@ -117,8 +117,8 @@ def strokes(rig: Rig, cycles: int | None = None) -> list[PosePath]:
 
     The star is that of `patterns.star`, but for its strokes, which last whole periods of the
     motion loop. The first one holds the rest above the cup's axis and the way to the first vertex,
-    the last ends with a rest. A star ends at its first vertex and is repeated from there. A
-    circle never rests on its way: its cycles are its strokes.
+    the last ends with a rest, and the others with a pause. A star ends at its first vertex and is
+    repeated from there. A circle never rests on its way: its cycles are its strokes.
 
     Raises:
         ValueError: `cycles` is below 1 or above `MAX_CYCLES`.
@@ -136,9 +136,13 @@ def strokes(rig: Rig, cycles: int | None = None) -> list[PosePath]:
         travel(rig, [start, end], plan.speed).pose
         for start, end in zip(corners, corners[1:], strict=False)
     ]
-    rest = round(plan.rest * rig.robot.rate)
+    rest, pause = (round(seconds * rig.robot.rate) for seconds in (plan.rest, plan.pause))
+    waits = [pause] * (len(lines) - 1) + [rest]
+    lines = [
+        np.concatenate([line, np.tile(line[-1], (wait, 1))])
+        for line, wait in zip(lines, waits, strict=True)
+    ]
     lines[0] = np.concatenate([np.tile(low, (rest, 1)), lines[0]])
-    lines[-1] = np.concatenate([lines[-1], np.tile(corners[-1], (rest, 1))])
     return [_timed(rig, line, stirring=True) for line in lines]
 
 

@@ -1,11 +1,11 @@
 from .criticise import Criticism as Criticism
 from .criticise import criticise as criticise
+from .design import Suggestion as Suggestion
 from .experiment import Experiment as Experiment
 from .experiment import Extension as Extension
 from .experiment import Proposal as Proposal
 from .experiment import Window as Window
 from .held_out import Gap as Gap
-from .held_out import Suggestion as Suggestion
 from .held_out import excess_rms as excess_rms
 from .hypothesis import Hypothesis as Hypothesis
 from .hypothesis import weighted_posterior as weighted_posterior

@@ -14,8 +14,9 @@ from ..prior import Prior, checked_prior
 from ..simulations.bank import SimulationBank
 from ..simulations.compute import Workers, open_compute
 from ..simulations.job import BATCH
+from .design import Suggestion, rivals_of, suggest
 from .experiment import Experiment, Extensions, Proposal, check_extensions
-from .held_out import Gap, Suggestion, gap, holds, suggest
+from .held_out import Gap, gap, holds
 from .hypothesis import Hypothesis, Interval, Weighted, weighted_posterior
 from .misfit import Found, confusion, locate, null_draws
 from .power import Sensitivity, sensitivity
@@ -27,7 +28,6 @@ from .verdict import (
     Verdict,
     VerdictKind,
     conclude,
-    label,
     probabilities,
     remaining,
 )
@@ -235,8 +235,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         verdict = conclude(base.check, sought, probability, level)
         members = remaining(probability, sought)
         rivals = _rivals(verdict, candidates, members)
-        best = {label(one.names): one.hypothesis.best for one in rivals}
-        suggestions = suggest(study, proposals, best)
+        suggestions = suggest(study, proposals, rivals_of(rivals, probability, seed))
     named = verdict.effects if verdict.kind is VerdictKind.EFFECT else ()
     accepted = tuple(accept) if accept is not None else named
     leading = _among(candidates, accepted)

@@ -110,9 +110,10 @@ class Proposal:
         simulate, noise, identity: As of an `Experiment`.
         shape: Of its output.
         label: What to do, for a person.
+        cost: Of making it, in any unit.
 
     Raises:
-        ValueError: a field is of another kind.
+        ValueError: a field is of another kind, or the cost is negative.
     """
 
     simulate: Simulator
@@ -120,6 +121,7 @@ class Proposal:
     shape: tuple[int, ...]
     identity: str = ""
     label: str = "experiment"
+    cost: float = 0.0
 
     def __post_init__(self) -> None:
         check_function("simulate", self.simulate)
@@ -127,6 +129,7 @@ class Proposal:
         check_kind("shape", self.shape, tuple)
         for length in self.shape:
             checked_integer("each of shape", length)
+        checked_number("cost", self.cost, lambda cost: 0.0 <= cost < math.inf, "0 or more")
 
 
 @dataclass(frozen=True)

@@ -1,25 +1,22 @@
-"""Models' predictions of other experiments: of held-out data, and of experiments not yet made."""
+"""Models' predictions of held-out data."""
 
-from collections.abc import Mapping, Sequence
-from itertools import combinations
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from .._float64 import in_float64
 from ..surrogates.output_vectors import MIN_LONG
-from .experiment import Experiment, Proposal
+from .experiment import Experiment
 from .hypothesis import log_densities, sized_covariances
 from .measurement_noise import Noise, gaussian, samples
 from .misfit import ACCEPTANCE_LEVEL, exceedance, judged_modes, orthonormal
 from .run_noise import errors_of, smooth_covariance
-from .study import Study
 
 NOISE_QUANTILE = 0.99  # quantile of the noise's RMS below which a gap may be noise
 MAX_LEFT_SHARE = 0.5  # of a gap beyond noise that an explanation may leave, unless it may be noise
 MIN_LPD_GAIN = 3.0  # log predictive density to be won on all held-out data together
 REPLICATES = 999
-RUNS_EACH = 3  # of each explanation in each proposed experiment
 
 
 class Gap(NamedTuple):
@@ -56,20 +53,6 @@ class Gap(NamedTuple):
     def fits(self) -> bool:
         """Whether noise and model error may be all that is left."""
         return self.p_value > ACCEPTANCE_LEVEL / 2.0  # the fitted data are a test, too
-
-
-class Suggestion(NamedTuple):
-    """Expected separation of two explanations by an experiment.
-
-    Attributes:
-        label: The experiment's.
-        between: The two that it separates least well, each its effects' names.
-        snr: Signal-to-noise ratio of their difference.
-    """
-
-    label: str
-    between: tuple[str, str]
-    snr: float
 
 
 def excess_rms(rms: float, noise: float) -> float:
@@ -111,7 +94,7 @@ def gap(
     observed = experiment.corrected[np.isfinite(experiment.observed)]
     fewer = 1.0 + 1.0 / min(len(before), len(after))  # the mean of few runs is noisy, too
     at = samples(experiment.observed)
-    simulated, factor, span = _judged(experiment.noise, experiment.observed, [before, after], fewer)
+    simulated, factor, span = judged(experiment.noise, experiment.observed, [before, after], fewer)
     rng = np.random.default_rng(seed)
     runs = gaussian(rng, simulated, REPLICATES)
     null = experiment.noise.draw(rng, at, REPLICATES) + runs
@@ -125,7 +108,7 @@ def gap(
     means = np.stack([before.mean(0), after.mean(0)])
     left = measures(observed - means)
     p_values = [min(1.0, 2.0 * float(exceedance(usual, seen).min())) for seen in left.T]
-    pooled = _judged(experiment.noise, experiment.observed, [before, after, *others], fewer)[0]
+    pooled = judged(experiment.noise, experiment.observed, [before, after, *others], fewer)[0]
     covariances, log_weight = sized_covariances(experiment.noise, at)
     density = log_densities(observed - means, [pooled + one for one in covariances], log_weight)
     sizes = np.sqrt(np.mean((observed - means) ** 2, axis=1))
@@ -143,54 +126,7 @@ def gap(
     )
 
 
-def suggest(
-    study: Study, proposals: Sequence[Proposal], rivals: Mapping[str, Mapping[str, float]]
-) -> list[Suggestion]:
-    """Proposals by how well they separate the worst separated rivals, best first.
-
-    One that cannot be simulated for each of the rivals is left out.
-
-    Args:
-        rivals: Explanation -> parameters of its model.
-    """
-    if len(rivals) < 2:
-        return []
-    found = []
-    for proposal in proposals:
-        signals = {}
-        for name, best in rivals.items():
-            theta = {key: np.full(RUNS_EACH, value) for key, value in best.items()}
-            (runs,) = study.run_each(f"next {proposal.label} {name}", [theta], proposal)
-            if not len(runs):
-                break
-            signals[name] = runs.signals.reshape(len(runs), -1)
-        else:
-            found.append(separation(proposal, signals))
-    return sorted(found, key=lambda one: -one.snr)
-
-
-@in_float64
-def separation(proposal: Proposal, signals: Mapping[str, np.ndarray]) -> Suggestion:
-    """The least length of the whitened difference of two explanations' means in its slow part, less
-    what the noise of the runs adds to it.
-
-    Args:
-        signals: Explanation -> runs [k, n] of the proposed experiment.
-    """
-    runs, factor, span = _judged(proposal.noise, np.zeros(proposal.shape), list(signals.values()))
-    white = np.linalg.solve(factor, np.linalg.solve(factor, runs).T)
-    own = np.trace(span.T @ white @ span)
-    snr = {}
-    for a, b in combinations(signals, 2):
-        difference = signals[a].mean(0) - signals[b].mean(0)
-        length = np.sum((span.T @ np.linalg.solve(factor, difference)) ** 2)
-        noise = own * (1.0 / len(signals[a]) + 1.0 / len(signals[b]))
-        snr[a, b] = float(np.sqrt(max(length - noise, 0.0)))
-    worst = min(snr, key=lambda pair: snr[pair])
-    return Suggestion(proposal.label, worst, snr[worst])
-
-
-def _judged(
+def judged(
     noise: Noise, observed: np.ndarray, groups: Sequence[np.ndarray], factor: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Prepare to judge predictions of n observed values.

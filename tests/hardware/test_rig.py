@@ -76,6 +76,7 @@ def test_the_bundled_rig_can_be_used():
         ("fill = 0.05 ", "fill = 0.08 ", "cup"),
         ("points = 9", "points = 9.5", "stirring.points"),
         ("points = 9", "points = 8", "stirring.points"),
+        ("points = 9", "points = 1", "stirring.points"),
         ("points = 9", "pionts = 9", "stirring.pionts"),
         ("[robot]", "zzz = 1\n[robot]", "zzz"),
         ('view = "xz"', 'view = "xz"\nrates = 30.0', "cameras.0.rates"),

@@ -10,13 +10,12 @@ from bolfi_liquids.hardware.motion import Trajectory, star
 from bolfi_liquids.calibration.stirs import (
     camera_noise,
     held_out_noise,
-    stir_proposals,
     windows,
 )
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.recording import Recording
 from bolfi_liquids.inputs.strokes import resting
-from bolfi_liquids.simulators import StirSimulator, stir_simulator
+from bolfi_liquids.simulators import StirSimulator
 
 AT_REST, RHO, SD = 16, 0.6, np.radians(0.2)
 
@@ -79,19 +78,3 @@ def test_a_camera_without_any_noise_is_not_believed(stirred, rng):
         with pytest.raises(InputError) as refused:
             camera_noise(recordings)
         assert refused.value.where == still.path.name
-
-
-def test_proposed_stirs_stay_within_the_cup_and_below_the_limit_of_speed(stirred, rng):
-    gripper, factor = stirred.gripper, np.array([1.5, 1.5, 1.0])  # a path beyond the cup
-    wide = replace(stirred, gripper=Trajectory(gripper.time, factor * gripper.position))
-    stirring = stir_simulator([noisy(wide, rng)], 200)
-    made = stir_proposals(stirring, camera_noise(stirring.recordings), None)
-    assert len({one.label for one in made}) == len({one.identity for one in made}) == len(made) == 4
-    cup, stick = stirring.setups[0].cup, stirring.setups[0].stick
-    for one in made:
-        (plan,) = one.simulate.simulate.__self__.recordings
-        path = plan.gripper.position[:, :2]
-        assert np.linalg.norm(path, axis=1).max() < cup.radius - stick.radius
-        assert one.shape == plan.inclination.shape
-        step = np.linalg.norm(np.diff(path, axis=0), axis=1) / np.diff(plan.gripper.time)
-        assert step.max() < 0.21

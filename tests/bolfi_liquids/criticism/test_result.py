@@ -7,12 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bolfi_liquids.inference.criticism import Suggestion
 
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.summary import bad_fit
 from bolfi_liquids.criticism.result import calibration_to_pour
+from bolfi_liquids.criticism.summary import SuggestedExperiment
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.errors import InputError
+from bolfi_liquids.motions import Motion
 from bolfi_liquids.run.run import Run
 
 
@@ -30,6 +33,22 @@ def criticised(run, keep_criticism):
 @pytest.fixture
 def extended(criticised):
     return bl.Criticism.open(criticised).calibration
+
+
+def test_the_motion_of_the_best_suggested_stir_is_kept_in_the_file(run, keep_criticism):
+    """A pour may be better, and has no motion; a motion is back as `record` takes it."""
+    motions = [
+        Motion("star", points, 0.02, 0.1, 0.24, pause, 1) for points, pause in ((9, 0.0), (2, 0.4))
+    ]
+    made = [
+        Suggestion(label, ("one", "other"), 5.0, error, 0.4, 8.0)
+        for label, error in (("a pour", 0.01), (motions[0].label, 0.1), (motions[1].label, 0.02))
+    ]
+    suggestions = tuple(SuggestedExperiment.of(one, motions) for one in made)
+    criticism = bl.Criticism.open(keep_criticism(run, suggestions=suggestions))
+    assert criticism.summary.suggestions == suggestions
+    assert Motion(**criticism.summary.next_motion) == motions[1]
+    assert suggestions[0].motion is None and suggestions[1].wrong_before == 0.4
 
 
 def latest_of(path):

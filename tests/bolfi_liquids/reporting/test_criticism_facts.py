@@ -18,8 +18,8 @@ from bolfi_liquids.reporting.warnings import Results
 
 SOURCES = ("stirs", "pours")
 EFFECTS = ("camera_delay", "gripper_scale", "stick_mass")
-CIRCLES = SuggestedExperiment("four circles", EFFECTS[:2], 1.0)
-STAR = SuggestedExperiment("the star", EFFECTS[:2], 5.5)
+CIRCLES = SuggestedExperiment("four circles", EFFECTS[:2], 1.0, 0.4, 0.3, 8.0)
+STAR = SuggestedExperiment("the star", EFFECTS[:2], 5.5, 0.4, 0.02, 9.0, {"pattern": "star"})
 TIED = {
     "verdict": VerdictKind.TIE,
     "effects": EFFECTS[:2],
@@ -81,7 +81,7 @@ PARTS = [
     ("where", {"where": ()}, ["No single"], []),
     ("detectable", {}, ["camera delay (14), gripper scale (4)"], ["stick mass"]),
     ("undetectable", {"untested": ("gripper_scale",)}, ["stick mass", "Untested: gripper"], []),
-    ("next", TIED, ["record the star", "5.5"], []),
+    ("next", TIED, ["record the star (9 s)", "5.5", "40 % to 2 %", "next_stir.toml"], []),
     ("next", TIED | {"suggestions": (CIRCLES,)}, ["None", "four circles", "1.0"], ["record"]),
 ]
 

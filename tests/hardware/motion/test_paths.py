@@ -57,7 +57,8 @@ def test_a_star_s_speed_and_acceleration_stay_within_their_limits(speed):
 
 
 @pytest.mark.parametrize(
-    ("argument", "value"), [("speed", 0.0), ("radius", float("nan")), ("points", 8)]
+    ("argument", "value"),
+    [("speed", 0.0), ("radius", float("nan")), ("points", 8), ("points", 1), ("pause", -0.1)],
 )
 def test_arguments_of_a_star_that_make_no_sense_are_named(argument, value):
     with pytest.raises(ValueError, match=argument):
@@ -97,6 +98,25 @@ def test_one_cycle_is_the_star_of_the_paper():
     assert apart.max() <= 0.5 * 0.1 / RATE
     assert path.pose[:, 3:] == pytest.approx(np.tile([np.pi, 0, 0], (len(path.time), 1)))
     assert path.stirring
+
+
+@pytest.mark.parametrize(("points", "pause"), [(2, 0.0), (3, 0.0), (5, 0.4)])
+def test_lines_and_pauses_are_stirred_as_they_are_planned(points, pause):
+    """Both ways from a plan to a path agree, and the gripper rests as long as it should."""
+    settings = {"points": points, "pause": pause, "cycles": 3}
+    plan = RIG.stirring.model_copy(update=settings)
+    path = stir(RIG.model_copy(update={"stirring": plan}))
+    expected = star(speed=0.1, height=0.235, acceleration=0.5, rest=2.0, rate=RATE, **settings)
+    count = 3 * points + 1
+    assert 0.0 <= path.duration - expected.time[-1] <= count / RATE
+    for position in (path.pose[:, :2], expected.position[:, :2]):
+        apart, _ = cKDTree(expected.position[:, :2]).query(position)
+        assert apart.max() <= 0.5 * 0.1 / RATE
+        moved = np.linalg.norm(np.diff(position, axis=0), axis=1)
+        still = np.sum(moved < 1e-9) / RATE
+        assert still == pytest.approx(2 * 2.0 + (count - 1) * pause, abs=2 * count / RATE)
+    if points == 2:
+        assert np.abs(expected.position[:, 1]).max() < 1e-15
 
 
 def test_a_cycle_visits_each_vertex_once_more():

@@ -108,6 +108,7 @@ PARTS = {
         (lambda: proposal(noise=3), "noise"),
         (lambda: proposal(shape=3), "shape"),
         (lambda: proposal(shape=(0,)), "shape"),
+        (lambda: proposal(cost=-1.0), "cost"),
     ],
     "Extension": [
         (lambda: criticism.Extension("flat"), "prior"),

@@ -1,0 +1,129 @@
+"""The next stir that tells most of the liquid, of a run whose model is settled."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .calibration.model_error import model_error, noise_beside
+from .calibration.stirs import camera_noise, stir_experiment
+from .criticism.result import calibration_to_pour
+from .inputs.settings import CriticismSettings
+from .motions import FILE, Motion, family, keep_motion, planned
+from .progress import phases
+from .run.compute import open_compute
+from .run.run import Run, RunOrPath
+from .seeds import Phase, generator
+from .simulators import StirSimulator, stir_simulator
+
+if TYPE_CHECKING:
+    from .inference.criticism import Proposal
+    from .inference.criticism.design import Rival
+    from .inference.simulations import Workers
+
+MOTIONS = 8
+"""That are considered, beside the first recording's own."""
+
+AGAIN = "the same stir again"
+
+MIN_RATIO = 1.5
+"""Of the two viscosities that an experiment must tell apart: simulations of nearer ones differ by
+little more than their noise."""
+
+
+@dataclass(frozen=True)
+class NextStir:
+    """A stir, and what it is expected to tell.
+
+    Attributes:
+        label: What to do.
+        cost: Its duration [s].
+        sd_before, sd_after: Of the log of the viscosity, now and expected after it. The simulator's
+            errors in the new stir count as independent of those in earlier ones.
+        motion: RUN/next_stir.toml; None where the same stir again is best.
+    """
+
+    label: str
+    cost: float
+    sd_before: float
+    sd_after: float
+    motion: Path | None
+
+
+def design_stir(
+    calibration: RunOrPath,
+    *,
+    seed: int = 0,
+    executor: "Workers | None" = None,
+    timeout: float | None = None,
+    progress: bool = True,
+) -> NextStir:
+    """Find the motion that tells most of the liquid's viscosity, and write it into the run.
+
+    Args:
+        calibration: Of stirs, or its RUN directory; effects that a criticism accepted count.
+        seed: Of all random draws.
+        executor, timeout: See `calibrate`.
+        progress: Whether to show phases on stderr.
+
+    Raises:
+        InputError: There is no such run, or another command works in it.
+        RuntimeError: No stir of the family could be simulated.
+    """
+    from .inference.criticism.design import remaining_sd, suggest
+    from .inference.criticism.study import Study
+
+    with Run.entered(calibration) as run, open_compute(executor, timeout) as compute:
+        known = calibration_to_pour(run)
+        posterior = {str(k): np.ravel(v) for k, v in known.posterior.data_vars.items()}
+        particles = int(known.record["settings"]["particles"])
+        stirring = stir_simulator(run.recordings[:1], particles)
+        motions = family(stirring, MOTIONS)
+        viscosity = float(np.median(posterior["viscosity"]))
+        proposals = list(_proposals(stirring, motions, viscosity))
+        sd = float(np.std(np.log(posterior["viscosity"])))
+        apart = max(2.0 * sd, float(np.log(MIN_RATIO)))
+        with run.bank() as bank, phases(shown=progress) as report:
+            own = replace(compute, batch=CriticismSettings.batch, bank=bank)
+            fitted = stir_experiment(stirring, camera_noise(run.recordings), None, "stir")
+            study = Study(fitted, run.prior, {}, own, seed=seed, report=report)
+            found = suggest(study, proposals, _rivals(posterior, viscosity, apart, seed))
+        if not found:
+            raise RuntimeError(f"{run.path}: none of the proposed stirs could be simulated")
+        best = found[0]
+        motion = {one.label: asdict(one) for one in motions}.get(best.label)
+        keep_motion(run.path, motion)
+    after = sd * remaining_sd(best.snr, apart / sd)
+    return NextStir(best.label, best.cost, sd, after, motion and run.path / FILE)
+
+
+def _proposals(
+    stirring: StirSimulator, motions: Sequence[Motion], viscosity: float
+) -> "Iterator[Proposal]":
+    """The recorded stir again, and the motions; the simulator errs in the rhythm of each."""
+    from .inference.criticism import Proposal
+
+    plans = {AGAIN: stirring} | {motion.label: planned(stirring, motion) for motion in motions}
+    for label, plan in plans.items():
+        noise = noise_beside(stirring, model_error(plan, viscosity))
+        duration = float(np.ptp(plan.time))
+        yield Proposal(plan.batched, noise, plan.observed.shape, plan.identity, label, duration)
+
+
+def _rivals(
+    posterior: Mapping[str, np.ndarray], viscosity: float, apart: float, seed: int
+) -> "dict[str, Rival]":
+    """A thin and a thick liquid about a viscosity [Pa s], so far apart in its log; what else is
+    unknown is the median, then as drawn."""
+    from .inference.criticism.design import RIVAL_DRAWS, Rival
+
+    rng = generator(seed, Phase.POSTERIOR_DRAWS)
+    rows = rng.integers(len(posterior["viscosity"]), size=RIVAL_DRAWS - 1)
+    theta = {name: np.append(np.median(of), of[rows]) for name, of in posterior.items()}
+    thin, thick = (
+        theta | {"viscosity": np.full(RIVAL_DRAWS, viscosity * np.exp(side * apart / 2.0))}
+        for side in (-1.0, 1.0)
+    )
+    return {"thin": Rival(thin, 0.5), "thick": Rival(thick, 0.5)}

@@ -1,0 +1,167 @@
+"""The next experiment: of those that could be made, the one after which fewest names are wrong."""
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from .._float64 import in_float64
+from .experiment import Proposal
+from .held_out import judged
+from .hypothesis import weighted_posterior
+from .study import Study
+from .verdict import Candidate, label
+
+FINALISTS = 2  # proposals of which every draw is simulated
+RIVAL_DRAWS = 3  # of each rival: the most probable parameters, and draws of its posterior
+OUTCOMES = 4000  # of each rival, of which the expected error is the mean
+
+
+class Rival(NamedTuple):
+    """An explanation among which an experiment should decide.
+
+    Attributes:
+        theta: Draws of its parameters, the most probable first, name -> [n].
+        probability: Before the experiment; those of all rivals sum to 1.
+    """
+
+    theta: Mapping[str, np.ndarray]
+    probability: float
+
+
+class Suggestion(NamedTuple):
+    """What an experiment is expected to tell.
+
+    Attributes:
+        label: The experiment's.
+        between: The two rivals that it separates least well.
+        snr: Signal-to-noise ratio of their difference.
+        error: Expected rate of wrong names after it, if the most probable rival is named.
+        before: The same rate without it.
+        cost: The experiment's.
+    """
+
+    label: str
+    between: tuple[str, str]
+    snr: float
+    error: float
+    before: float
+    cost: float
+
+
+def rivals_of(
+    candidates: Sequence[Candidate], probability: Mapping[str, float], seed: int
+) -> dict[str, Rival]:
+    """Explanations as rivals, by name, as probable as they are; where none is, all are alike."""
+    weights = np.array([probability[label(one.names)] for one in candidates])
+    if not weights.sum() > 0.0:
+        weights = np.ones(len(candidates))
+    rivals = {}
+    for one, share in zip(candidates, weights / weights.sum(), strict=True):
+        best = one.hypothesis.best
+        drawn = weighted_posterior(one.hypothesis, seed).draw(seed, RIVAL_DRAWS - 1)
+        theta = {name: np.append(value, drawn[name]) for name, value in best.items()}
+        rivals[label(one.names)] = Rival(theta, float(share))
+    return rivals
+
+
+def suggest(
+    study: Study, proposals: Sequence[Proposal], rivals: Mapping[str, Rival]
+) -> list[Suggestion]:
+    """The best proposals, best first.
+
+    Each is simulated once with every rival, the best `FINALISTS` with all draws (sequential
+    halving, Karnin et al. 2013, of two rounds). One that cannot be simulated for each of the rivals
+    is left out. A run of each rival has the same seed, so what they differ by is not chance.
+    """
+    if len(rivals) < 2:
+        return []
+    first = [(one, _simulated(study, one, rivals, slice(0, 1))) for one in proposals]
+    found = [(one, runs, assess(one, rivals, runs)) for one, runs in first if runs.size]
+    finalists = []
+    for one, runs, _ in sorted(found, key=lambda of: _rank(of[2]))[:FINALISTS]:
+        more = _simulated(study, one, rivals, slice(1, None))
+        finalists.append(assess(one, rivals, np.concatenate([runs, more], axis=1)))
+    return sorted(finalists, key=_rank)
+
+
+def _rank(suggestion: Suggestion) -> tuple[float, float]:
+    return suggestion.error, -suggestion.snr
+
+
+def _simulated(
+    study: Study, proposal: Proposal, rivals: Mapping[str, Rival], draws: slice
+) -> np.ndarray:
+    """Runs [rivals, n, values] of those draws that can be simulated for each of the rivals."""
+    thetas = [{name: of[draws] for name, of in one.theta.items()} for one in rivals.values()]
+    phase = "next experiment, again" if draws.start else "next experiment"
+    made = study.run_each(phase, thetas, proposal)
+    common = set.intersection(*(set(runs.seeds.tolist()) for runs in made))
+    rows = [[seed in common for seed in runs.seeds.tolist()] for runs in made]
+    values = int(np.prod(proposal.shape))
+    return np.stack(
+        [runs.signals[row].reshape(-1, values) for runs, row in zip(made, rows, strict=True)]
+    )
+
+
+@in_float64
+def assess(proposal: Proposal, rivals: Mapping[str, Rival], runs: np.ndarray) -> Suggestion:
+    """What a proposal is expected to tell, of runs [rivals, n, values]; the k-th of each rival
+    have one seed.
+
+    The rivals' outputs are taken for Gaussian with one covariance: the noise, and what the runs
+    of a rival differ by, which its free parameters can absorb.
+    """
+    own, factor, span = judged(proposal.noise, np.zeros(proposal.shape), list(runs))
+    noise = np.trace(span.T @ np.linalg.solve(factor, np.linalg.solve(factor, own).T) @ span)
+    count, names = runs.shape[1], list(rivals)
+    squared = np.zeros((len(names), len(names)))
+    for i, j in combinations(range(len(names)), 2):
+        apart = runs[i] - runs[j]
+        length = np.sum((span.T @ np.linalg.solve(factor, apart.mean(0))) ** 2)
+        # what runs of one seed have in common is gone from their difference
+        left = np.var(apart, axis=0, ddof=1).sum() / np.trace(own) if own.any() else 0.0
+        squared[i, j] = squared[j, i] = max(length - left * noise / count, 0.0)
+    i, j = min(combinations(range(len(names)), 2), key=lambda pair: squared[pair])
+    probability = np.array([one.probability for one in rivals.values()])
+    before = 1.0 - float(probability.max())
+    return Suggestion(
+        label=proposal.label,
+        between=(names[i], names[j]),
+        snr=float(np.sqrt(squared[i, j])),
+        error=min(naming_error(squared, probability), before),
+        before=before,
+        cost=proposal.cost,
+    )
+
+
+def naming_error(squared: np.ndarray, probability: np.ndarray) -> float:
+    """Expected rate of wrong names, if the most probable rival is named after an experiment.
+
+    Args:
+        squared: Squared distances between the rivals' expected outputs, in the noise's sd [k, k].
+        probability: Of each rival before the experiment [k].
+    """
+    # coordinates of these distances (classical scaling, Torgerson 1952)
+    centring = np.eye(len(squared)) - 1.0 / len(squared)
+    size, axes = np.linalg.eigh(-0.5 * centring @ squared @ centring)
+    means = axes * np.sqrt(np.maximum(size, 0.0))
+    noise = np.random.default_rng(0).normal(size=(OUTCOMES, len(means)))
+    prior = np.log(np.maximum(probability, 1e-300)) - 0.5 * np.sum(means**2, axis=1)
+    error = 0.0
+    for mean, share in zip(means, probability, strict=True):
+        log_posterior = prior + (mean + noise) @ means.T
+        weight = np.exp(log_posterior - log_posterior.max(1, keepdims=True))
+        error += share * float(np.mean(1.0 - 1.0 / weight.sum(1)))
+    return float(error)
+
+
+def remaining_sd(snr: float, sds_apart: float) -> float:
+    """Sd of a parameter after an experiment over that before, by Laplace's approximation.
+
+    Args:
+        snr: By which the experiment separates two of its values.
+        sds_apart: Distance of these values in the sd before.
+    """
+    return float((1.0 + (snr / sds_apart) ** 2) ** -0.5)
