@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from ..effect import Effect
+from ..effect_check import check_effect
 
 _registered: dict[str, Effect] = {}
 
@@ -14,13 +15,14 @@ EFFECTS: Mapping[str, Effect] = MappingProxyType(_registered)
 
 
 def register(effect: Effect) -> Effect:
-    """Add an effect to `EFFECTS` for the life of this process, and return it.
+    """Try an effect, add it to `EFFECTS` for the life of this process, and return it.
 
     Worker processes start afresh: an effect from outside has to be registered there as well,
     for instance by the module that defines what they run.
 
     Raises:
-        ValueError: it is no `Effect`, or its name is taken.
+        ValueError: it is no `Effect`, its name is taken, or its prior or a hook breaks the rules
+            (`effect_check`). A rheology is tried when a scene is first compiled with it.
     """
     if not isinstance(effect, Effect):
         raise ValueError(f"register wants a models.Effect, got {effect!r}")
@@ -29,6 +31,7 @@ def register(effect: Effect) -> Effect:
             f"there is already an effect {effect.name!r} ({_registered[effect.name].text}); "
             "choose another name"
         )
+    check_effect(effect)
     _registered[effect.name] = effect
     return effect
 
@@ -40,7 +43,8 @@ def _discover() -> None:
         effect = getattr(importlib.import_module(f"{__name__}.{module.name}"), "EFFECT", None)
         if not (isinstance(effect, Effect) and effect.name == module.name):
             raise ImportError(f"{__name__}.{module.name} must define EFFECT, an Effect of its name")
-        register(effect)
+        # the tests try these: here it would import what makes priors
+        _registered[effect.name] = effect
 
 
 _discover()
