@@ -150,7 +150,7 @@ def stir_proposals(
     for label, path in paths.items():
         plan = planned_recording(path.time, path.position, recording.attrs)
         own, shape = StirSimulator((plan,), (setup,)), (len(path.time), len(PLANE_NAMES))
-        made.append(Proposal(own.batched, noise, shape, own.identity, label))
+        made.append(Proposal(own.batched, noise, shape, own.identity_with_effects, label))
     return made
 
 

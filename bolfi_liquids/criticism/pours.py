@@ -135,7 +135,7 @@ def pour_experiment(table: PourTable, cups: "Cups", density: float) -> "Experime
         pours.batched,
         table.observed,
         actions.noise,
-        pours.identity,
+        pours.identity_with_effects,
         table.path.name,
         tuple(windows),
     )
@@ -153,7 +153,8 @@ def pour_proposals(cups: "Cups", density: float) -> list["Proposal"]:
         actions = Fractions(np.full(len(distance), rate), distance)
         pours = PourSimulator(cups, density, actions)
         label = f"pours at {np.degrees(rate):.0f} deg/s from {apart} cm"
-        made.append(Proposal(pours.batched, actions.noise, shape, pours.identity, label))
+        identity = pours.identity_with_effects
+        made.append(Proposal(pours.batched, actions.noise, shape, identity, label))
     return made
 
 

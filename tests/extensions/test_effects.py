@@ -15,8 +15,8 @@ from jax import random
 from bolfi_liquids import models
 from bolfi_liquids.inputs.bundled import bundled_recording
 
+from .clock_drift import EFFECT as CLOCK_DRIFT
 from .named import named
-from .wind import EFFECT as WIND
 
 LIQUID = models.Liquid(viscosity=0.1, cohesion=0.2, density=1000.0)
 SEEDS = np.array([3, 1, 2])
@@ -43,7 +43,7 @@ def effect(request):
     if request.param in models.EFFECTS:
         yield models.EFFECTS[request.param]
         return
-    own = WIND if request.param == "example" else named(request.param)
+    own = CLOCK_DRIFT if request.param == "example" else named(request.param)
     models.register(own)
     yield own
     del registry._registered[own.name]
