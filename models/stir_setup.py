@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .apic.gravity import GRAVITY
 from .number_checks import check_numbers
@@ -216,7 +217,7 @@ def hanging(tilt: np.ndarray) -> np.ndarray:
     return down / np.linalg.norm(down, axis=-1, keepdims=True)
 
 
-def start_tilt(setup: StirSetup, rig: Rig, density: np.ndarray, offset: np.ndarray) -> np.ndarray:
+def start_tilt(setup: StirSetup, rig: Rig, density: ArrayLike, offset: np.ndarray) -> np.ndarray:
     """Inclination at which each stick starts [rad], shape [B, 2].
 
     A stick that nothing rubs leaves its first inclination at once, so its first samples alone show
@@ -231,7 +232,7 @@ def start_tilt(setup: StirSetup, rig: Rig, density: np.ndarray, offset: np.ndarr
     """
     first = np.array(setup.tilt) - offset
     rest = first if setup.rest is None else np.array(setup.rest) - offset
-    needed = _weight_torque(setup.stick, rig, density, rest)
+    needed = _weight_torque(setup.stick, rig, np.asarray(density), rest)
     borne = rig.pivot_friction / np.maximum(np.maximum(needed, rig.pivot_friction), LEAST_TORQUE)
     return first + borne[:, None] * (rest - first)
 
