@@ -138,7 +138,9 @@ def stir_proposals(
     for motion in motions:
         plan, cost = planned(stirring, motion), float(motion.path.time[-1])
         shape = plan.observed.shape
-        made.append(Proposal(plan.batched, noise, shape, plan.identity, motion.label, cost))
+        made.append(
+            Proposal(plan.batched, noise, shape, plan.identity_with_effects, motion.label, cost)
+        )
     return made
 
 

@@ -3,7 +3,7 @@
 import hashlib
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cached_property
@@ -32,6 +32,14 @@ TOGETHER = 4
 """Simulations that one thread makes at the same time."""
 
 
+def versions(effects: Iterable[str]) -> list[str]:
+    """Names of effects, those of one's own with the SHA-256 of the file that defines them."""
+    from .models.effects import own_effects
+
+    own = own_effects()
+    return [f"{name} {own[name]}" if name in own else name for name in effects]
+
+
 class FluidSimulator(ABC):
     """Simulations of the fluid, by name of their parameters."""
 
@@ -43,6 +51,14 @@ class FluidSimulator(ABC):
     @abstractmethod
     def identity(self) -> str:
         """A text that two equal simulators share, and no others."""
+
+    @property
+    def identity_with_effects(self) -> str:
+        """Its identity where any effect may act: the files of one's own effects decide, too."""
+        from .models.effects import own_effects
+
+        own = versions(sorted(own_effects()))
+        return json.dumps([self.identity, *own]) if own else self.identity
 
     @property
     def batched(self) -> "BatchSimulator":
@@ -243,5 +259,6 @@ class PourSimulator(FluidSimulator):
     def identity(self) -> str:
         """Text that outcome, cups, density and effects decide."""
         name, *fixed = self.outcome.settings
-        made_of = [self.cups.settings(self.particles), self.density, list(self.effects), *fixed]
+        effects = versions(self.effects)
+        made_of = [self.cups.settings(self.particles), self.density, effects, *fixed]
         return json.dumps([name, *made_of], sort_keys=True)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .effect import Effect
-from .effects import EFFECTS
+from .effects import EFFECTS, OWN_EFFECTS
 from .liquid import Liquid
 from .number_checks import checked_batch
 from .rig import Rig
@@ -54,7 +54,7 @@ def acting_in(scene: str, effects: Mapping[str, ArrayLike] | None, size: int) ->
     if unknown:
         raise ValueError(
             f"unknown effects: {', '.join(unknown)}; there are {', '.join(EFFECTS)}, "
-            "and models.register adds others"
+            f"and {OWN_EFFECTS} or models.register adds others"
         )
     checked = [Acting(EFFECTS[n], _coefficient(n, effects[n], size)) for n in sorted(effects)]
     return tuple(a for a in checked if scene in a.effect.scenes and a.changed.any())

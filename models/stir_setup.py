@@ -5,14 +5,18 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from .apic.gravity import GRAVITY
 from .number_checks import check_numbers
 from .numerics import LEAST_VISCOSITY, MODEL_VERSION, Numerics, check_resolution
-from .trajectory import PivotPath, top_speed
+from .rig import Rig
+from .trajectory import PivotPath, resting, top_speed
 
 MAX_FILL_RATIO = 1.5  # times the setup's fill is the largest
 MAX_TILT = 1.5  # rad
 FIRST_SECONDS, FIRST_SAMPLES = 0.15, 5  # of a recording, which show how the stick starts
+LEAST_TORQUE = 1e-12  # N m: nothing, to divide by
 
 
 class HasRig(Protocol):
@@ -73,6 +77,7 @@ class StirSetup:
         numerics: Constants of the discretisation.
         tilt: Of the stick at the start, as the cameras see it, in the xz and yz planes [rad]; what
             effects in the cameras add is no lean of the stick.
+        rest: Its mean until the gripper moves, seen likewise; None: the same.
     """
 
     cup: Cup
@@ -81,6 +86,7 @@ class StirSetup:
     particles: int = 0
     numerics: Numerics = field(default_factory=Numerics)
     tilt: tuple[float, float] = (0.0, 0.0)
+    rest: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         check_numbers("setup", submerged=self.submerged)
@@ -93,8 +99,9 @@ class StirSetup:
     def _faults(self) -> Iterator[str]:
         if self.particles != int(self.particles):
             yield f"particles must be a whole number, got {self.particles}"
-        if len(self.tilt) != 2 or not all(abs(angle) < MAX_TILT for angle in self.tilt):
-            yield f"tilt must be two angles of less than {MAX_TILT} rad, got {self.tilt}"
+        for name, lean in (("tilt", self.tilt), ("rest", self.rest or self.tilt)):
+            if len(lean) != 2 or not all(abs(angle) < MAX_TILT for angle in lean):
+                yield f"{name} must be two angles of less than {MAX_TILT} rad, got {lean}"
         if self.submerged > self.stick.length:
             yield (
                 "submerged must be at most the stick's length, or its pivot is in the liquid: "
@@ -150,7 +157,7 @@ class StirSetup:
             submerged=min(submerged, fill),
             particles=particles,
             numerics=numerics or Numerics(),
-            tilt=_first_tilt(recording),
+            **_leans(recording),
         )
         check_resolution(radius, setup.cell)
         return setup
@@ -210,14 +217,46 @@ def hanging(tilt: np.ndarray) -> np.ndarray:
     return down / np.linalg.norm(down, axis=-1, keepdims=True)
 
 
-def _first_tilt(recording: HasRig) -> tuple[float, float]:
-    """Mean inclination of the first samples [rad], 0 where there is none."""
+def start_tilt(setup: StirSetup, rig: Rig, density: ArrayLike, offset: np.ndarray) -> np.ndarray:
+    """Inclination at which each stick starts [rad], shape [B, 2].
+
+    A stick that nothing rubs leaves its first inclination at once, so its first samples alone show
+    where it starts. One that dry friction holds stays there until the gripper moves, so all of the
+    rest does. Between the two, the share of the weight's torque that friction bears decides.
+
+    Args:
+        setup: Whose cameras saw it.
+        rig: Stick, friction, fill and path of B stirs.
+        density: Of the liquids [kg/m³], shape [B].
+        offset: What the cameras add to the inclination of a hanging stick [rad], shape [B, 2].
+    """
+    first = np.array(setup.tilt) - offset
+    rest = first if setup.rest is None else np.array(setup.rest) - offset
+    needed = _weight_torque(setup.stick, rig, np.asarray(density), rest)
+    borne = rig.pivot_friction / np.maximum(np.maximum(needed, rig.pivot_friction), LEAST_TORQUE)
+    return first + borne[:, None] * (rest - first)
+
+
+def _weight_torque(stick: Stick, rig: Rig, density: np.ndarray, tilt: np.ndarray) -> np.ndarray:
+    """Torque of weight and lift on sticks that lean by `tilt` [B, 2] at the start [N m]."""
+    down = hanging(tilt)
+    above = (rig.path[:, 0, 2] - rig.fill) / np.maximum(-down[:, 2], 0.2)
+    dry = np.clip(above, 0.0, stick.length)
+    lift = density * np.pi * stick.radius**2 * (stick.length**2 - dry**2)
+    return 0.5 * GRAVITY * np.abs(rig.stick_mass * stick.length - lift) * np.hypot(*down[:, :2].T)
+
+
+def _leans(recording: HasRig) -> dict[str, tuple[float, float]]:
+    """Mean inclination of the first samples, and until the gripper moves [rad]; without both
+    planes in the first, none."""
     seen = getattr(recording, "inclination", None)
     if seen is None:
-        return 0.0, 0.0
+        return {}
     time = np.asarray(recording.gripper.time)
     first = max(FIRST_SAMPLES, int(np.sum(time - time[0] < FIRST_SECONDS)))
-    start = np.asarray(seen, float)[:first]
-    if not np.isfinite(start).any(axis=0).all():
-        return 0.0, 0.0
-    return tuple(np.nanmean(start, axis=0).tolist())
+    last = max(first, resting(recording.gripper))
+    seen = np.asarray(seen, float)
+    if not np.isfinite(seen[:first]).any(axis=0).all():
+        return {}
+    means = (tuple(np.nanmean(seen[:count], axis=0).tolist()) for count in (first, last))
+    return dict(zip(("tilt", "rest"), means, strict=True))

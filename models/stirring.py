@@ -11,7 +11,7 @@ from .liquid import Liquid
 from .number_checks import checked_seeds
 from .rig import Rig, check_rig
 from .runtime import Watch
-from .stir_setup import StirSetup, hanging
+from .stir_setup import StirSetup, hanging, start_tilt
 from .stirs.march import Stirs, march
 from .trajectory import PivotPath, step_path
 
@@ -64,7 +64,7 @@ def stir(
     with runtime.LOCK:
         # what tilted cameras add is no lean of the stick
         upright = changed_signal(gripper.time, np.zeros((size, len(gripper.time), 2)), acting)
-        start = hanging(np.array(setup.tilt) - upright[:, 0])
+        start = hanging(start_tilt(setup, rig, liquid.density, upright[:, 0]))
         for kinds, rows, coefficients in liquid_sets(acting, size):
             stirs = Stirs(liquid, rig, seeds, start, coefficients).rows(rows)
             directions[rows] = march(setup, stirs, step, kinds, watch)

@@ -4,6 +4,9 @@ from typing import Protocol
 
 import numpy as np
 
+MAX_REST_TRAVEL = 1e-4
+"""Distance from its first position within which the gripper rests [m]."""
+
 
 class PivotPath(Protocol):
     """Times [T] in s and pivot positions [T, 3] in m; rows that are not finite are skipped."""
@@ -40,6 +43,14 @@ def top_speed(gripper: PivotPath, step: float) -> float:
     """Top speed of the pivot [m/s] over intervals of a step or a sample, whichever is longer."""
     path = step_path(gripper, step)
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).max(initial=0.0) / step)
+
+
+def resting(gripper: PivotPath) -> int:
+    """Number of samples before the gripper first moves."""
+    position = np.asarray(gripper.position)
+    start = position[np.isfinite(position).all(axis=1)][0]
+    moved = np.linalg.norm(position - start, axis=1) > MAX_REST_TRAVEL  # not where it is NaN
+    return int(np.argmax(moved)) if moved.any() else len(moved)
 
 
 def finite_samples(gripper: PivotPath) -> tuple[np.ndarray, np.ndarray]:

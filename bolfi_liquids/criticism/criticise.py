@@ -156,7 +156,8 @@ def _stirs(
     viscosity = calibration.summary.best["viscosity"]
 
     def experiment(own: StirSimulator, noise: "AutoregressiveNoise", label: str):
-        return stir_experiment(own, noise, model_error(own, viscosity, clean), label)
+        made = stir_experiment(own, noise, model_error(own, viscosity, clean), label)
+        return replace(made, identity=own.identity_with_effects)
 
     def held_out(recording: Recording) -> "inference.criticism.Experiment":
         own = stir_simulator([recording], stirring.setups[0].particles)

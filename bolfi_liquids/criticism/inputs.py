@@ -17,7 +17,7 @@ from ..inputs.pour_table import Pours, PourTable, check_scene, table_and_cups, t
 from ..inputs.recording import Recording
 from ..inputs.settings import FALSE_ALARM_RATE, CriticismSettings
 from ..motions import Motion, family
-from ..simulators import StirSimulator, stir_simulator
+from ..simulators import StirSimulator, stir_simulator, versions
 
 if TYPE_CHECKING:
     from ..inference.criticism import AutoregressiveNoise
@@ -95,7 +95,10 @@ class Inputs:
             "version": version("bolfi-liquids"),
             # how many are simulated together changes no result
             "settings": {k: v for k, v in asdict(self.settings).items() if k != "batch"},
-            "considered": [names_of_effects(s, self.settings.effects) for s in ("stir", "pour")],
+            "considered": [
+                versions(names_of_effects(scene, self.settings.effects))
+                for scene in ("stir", "pour")
+            ],
             **{
                 group: {one.path.name: one.hash for one in some if one is not None}
                 for group, some in files.items()

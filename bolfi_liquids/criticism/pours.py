@@ -135,7 +135,7 @@ def pour_experiment(table: PourTable, cups: "Cups", density: float) -> "Experime
         pours.batched,
         table.observed,
         actions.noise,
-        pours.identity,
+        pours.identity_with_effects,
         table.path.name,
         tuple(windows),
     )
@@ -154,7 +154,8 @@ def pour_proposals(cups: "Cups", density: float) -> list["Proposal"]:
         pours = PourSimulator(cups, density, actions)
         label = f"pours at {np.degrees(rate):.0f} deg/s from {apart} cm"
         turning = cups.pour.final_angle / float(rate)
-        made.append(Proposal(pours.batched, actions.noise, shape, pours.identity, label, turning))
+        identity = pours.identity_with_effects
+        made.append(Proposal(pours.batched, actions.noise, shape, identity, label, turning))
     return made
 
 

@@ -9,8 +9,6 @@ from .recording import Recording
 
 MOVING_SHARE = 0.5
 """Share of the greatest speed above which the gripper moves: it rests too shortly at corners."""
-MAX_REST_TRAVEL = 1e-4
-"""Distance from its first position within which the gripper rests [m]."""
 EVEN_PARTS = 8
 """Parts into which a stir without separate strokes is cut."""
 
@@ -35,9 +33,9 @@ def speed(recording: Recording) -> NDArray[np.float64]:
 
 def resting(recording: Recording) -> NDArray[np.bool_]:
     """Samples before the gripper first moves, bool (T,)."""
-    position = recording.gripper.position
-    moved = np.linalg.norm(position - position[0], axis=1) > MAX_REST_TRAVEL
-    return np.cumsum(moved) == 0
+    from ..models.trajectory import resting as samples_at_rest
+
+    return np.arange(len(recording.time)) < samples_at_rest(recording.gripper)
 
 
 def strokes(recording: Recording) -> list[Stroke]:

@@ -235,7 +235,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         verdict = conclude(base.check, sought, probability, level)
         members = remaining(probability, sought)
         rivals = _rivals(verdict, candidates, members)
-        suggestions = suggest(study, proposals, rivals_of(rivals, probability, seed))
+        known = rivals_of(rivals, probability, seed) if proposals else {}
+        suggestions = suggest(study, proposals, known)
     named = verdict.effects if verdict.kind is VerdictKind.EFFECT else ()
     accepted = tuple(accept) if accept is not None else named
     leading = _among(candidates, accepted)

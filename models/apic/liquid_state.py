@@ -4,6 +4,7 @@
 import numpy as np
 import taichi as ti
 
+from ..effect_check import check_rheology
 from ..faults import ABSENT, SOUND
 from .gravity import GRAVITY
 from .lanes import LANES, STRIDE, lanes, mat3, vec3
@@ -100,6 +101,8 @@ class LiquidState:
         )
         self.lack = ti.Vector.field(LANES, ti.f32, groups)  # of density, where the level is high
 
+        for effect in effects:
+            check_rheology(effect)
         self.rheologies = [effect.make_rheology() for effect in effects]
         if self.rheologies:
             self.thickness = of_cells()  # viscosity of a cell [m²/s]

@@ -1,26 +1,41 @@
-"""The registry of effects. Every module in this folder is one effect, named like its file."""
+"""The registry of effects. Every module in this folder is one effect, named like its file.
 
+The files that `BOLFI_LIQUIDS_EFFECTS` names define others.
+"""
+
+import hashlib
 import importlib
+import inspect
+import os
 import pkgutil
 from collections.abc import Mapping
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 from types import MappingProxyType
 
 from ..effect import Effect
+from ..effect_check import check_effect
+
+OWN_EFFECTS = "BOLFI_LIQUIDS_EFFECTS"
+"""Environment variable that names files of effects of one's own, separated as in PATH. Each defines
+`EFFECT`, and every process that simulates loads it."""
 
 _registered: dict[str, Effect] = {}
+_digests: dict[str, str] = {}
 
 EFFECTS: Mapping[str, Effect] = MappingProxyType(_registered)
 """Every effect by name: the built-in ones in alphabetical order, then those registered since."""
 
 
 def register(effect: Effect) -> Effect:
-    """Add an effect to `EFFECTS` for the life of this process, and return it.
+    """Try an effect, add it to `EFFECTS` for the life of this process, and return it.
 
-    Worker processes start afresh: an effect from outside has to be registered there as well,
-    for instance by the module that defines what they run.
+    Worker processes start afresh: an effect from outside has to be registered there as well, by
+    the variable `OWN_EFFECTS` or by the module that defines what they run.
 
     Raises:
-        ValueError: it is no `Effect`, or its name is taken.
+        ValueError: it is no `Effect`, its name is taken, or its prior or a hook breaks the rules
+            (`effect_check`). A rheology is tried when a scene is first compiled with it.
     """
     if not isinstance(effect, Effect):
         raise ValueError(f"register wants a models.Effect, got {effect!r}")
@@ -29,8 +44,22 @@ def register(effect: Effect) -> Effect:
             f"there is already an effect {effect.name!r} ({_registered[effect.name].text}); "
             "choose another name"
         )
+    check_effect(effect)
+    _digests[effect.name] = _digest_of_file(effect)
     _registered[effect.name] = effect
     return effect
+
+
+def own_effects() -> dict[str, str]:
+    """SHA-256 of the file that defines each effect that is not built in, "" if there is none."""
+    return {name: digest for name, digest in _digests.items() if name in _registered}
+
+
+def _digest_of_file(effect: Effect) -> str:
+    try:
+        return hashlib.sha256(Path(inspect.getfile(effect.make_prior)).read_bytes()).hexdigest()
+    except (OSError, TypeError):  # typed into a notebook, or no function
+        return ""
 
 
 def _discover() -> None:
@@ -40,7 +69,26 @@ def _discover() -> None:
         effect = getattr(importlib.import_module(f"{__name__}.{module.name}"), "EFFECT", None)
         if not (isinstance(effect, Effect) and effect.name == module.name):
             raise ImportError(f"{__name__}.{module.name} must define EFFECT, an Effect of its name")
-        register(effect)
+        # the tests try these: here it would import what makes priors
+        _registered[effect.name] = effect
+
+
+def _load(path: str) -> None:
+    """Register the effect that a file defines."""
+    try:
+        spec = spec_from_file_location(Path(path).stem, path)
+        if spec is None or spec.loader is None:
+            raise FileNotFoundError(f"{path} is no Python file")
+        spec.loader.exec_module(module := module_from_spec(spec))
+        effect = module.EFFECT
+    except Exception as err:  # of a file that a person wrote: whatever is wrong in it
+        raise ValueError(
+            f"{OWN_EFFECTS} names {path}: {type(err).__name__}: {err}; it must be a Python file "
+            "that defines EFFECT, a models.Effect"
+        ) from err
+    register(effect)
 
 
 _discover()
+for _path in filter(None, os.environ.get(OWN_EFFECTS, "").split(os.pathsep)):
+    _load(_path)

@@ -1,10 +1,9 @@
-"""Cameras whose frame does not stand upright.
+"""Cameras whose frame is tipped about the y axis.
 
-One coefficient moves both cameras as one body: their common frame is tipped about the y axis.
 The camera that looks along y, at the xz plane, is rolled by it, and its angles shift by a
-constant. The one that looks along x is pitched, which changes its angles only by the product of
-tilt and both angles (below 0.01 degrees for 1, 3 and 3 degrees); that is left out. A frame tipped
-about the x axis would be an effect of its own.
+constant. If both stand on one frame, the one that looks along x is pitched, which changes its
+angles only by the product of tilt and both angles (below 0.01 degrees for 1, 3 and 3 degrees); that
+is left out. `camera_tilt_yz` rolls that camera.
 """
 
 import numpy as np
@@ -28,7 +27,7 @@ EFFECT = Effect(
     unit="rad",
     neutral=0.0,
     acts_in="sensor",
-    text="The cameras' frame is tipped about the y axis: the inclination in the xz plane shows a "
+    text="The camera that looks along y is rolled: the inclination in the xz plane shows a "
     "constant offset.",
     source="A camera rolled about its optical axis turns the whole picture by the angle",
     make_prior=_prior,

@@ -1,4 +1,7 @@
-"""Dry friction in the pivot from which the stick hangs."""
+"""Dry friction in the pivot from which the stick hangs.
+
+It holds a stick off the vertical before the gripper moves: `start_tilt` of the setup.
+"""
 
 from ..effect import Effect
 

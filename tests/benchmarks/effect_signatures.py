@@ -20,6 +20,7 @@ SIZES = {
     "camera_delay": 0.05,
     "camera_rotation": float(np.radians(5.0)),
     "camera_tilt": float(np.radians(1.0)),
+    "camera_tilt_yz": float(np.radians(1.0)),
     "fill_level": 1e-3,
     "gripper_scale": 1.05,
     "pivot_friction": 2e-4,

@@ -7,15 +7,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bolfi_liquids.inference.distributions import Univariate
 from bolfi_liquids.models import effects as registry
+from bolfi_liquids.models import runtime
+from bolfi_liquids.models.effect_check import check_effect, check_rheology
 from jax import random
 
 from bolfi_liquids import models
 from bolfi_liquids.inputs.bundled import bundled_recording
 
+from .clock_drift import EFFECT as CLOCK_DRIFT
 from .named import named
-from .wind import EFFECT as WIND
 
 LIQUID = models.Liquid(viscosity=0.1, cohesion=0.2, density=1000.0)
 SEEDS = np.array([3, 1, 2])
@@ -42,7 +43,7 @@ def effect(request):
     if request.param in models.EFFECTS:
         yield models.EFFECTS[request.param]
         return
-    own = WIND if request.param == "example" else named(request.param)
+    own = CLOCK_DRIFT if request.param == "example" else named(request.param)
     models.register(own)
     yield own
     del registry._registered[own.name]
@@ -67,8 +68,14 @@ def test_it_explains_itself(effect):
     assert models.EFFECTS[effect.name] is effect
     assert effect.text.endswith(".") and len(effect.source) > 20
     assert effect.prior is effect.prior
-    # as the engine reads it: numpyro itself warns of the zero of a half-normal
-    assert np.isfinite(Univariate(effect.prior).log_prob(np.asarray(effect.neutral)))
+
+
+def test_prior_and_hooks_are_as_register_wants_them(effect):
+    """Which tries those that are not built in; a rheology is tried once Taichi runs."""
+    check_effect(effect)
+    if effect.make_rheology is not None:
+        runtime.start()
+        check_rheology(effect)
 
 
 def test_a_neutral_coefficient_leaves_every_bit_of_a_stir(effect, stir):

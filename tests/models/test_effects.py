@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import numpyro.distributions as dist
 import pytest
+from bolfi_liquids.models import effects as registry
 from bolfi_liquids.models.effect_coefficients import acting_in, changed_signal
 from jax import random
 
@@ -206,20 +207,85 @@ def test_the_registry_takes_only_new_effects(register):
         wind.neutral = 1.0
 
 
-@pytest.mark.slow
+def doubled_in_place(time, angles, coefficient):
+    angles *= 2.0
+    return angles
+
+
+def late_time(time, angles, coefficient):
+    time += 1.0
+    return angles
+
+
+def rig_of(change):
+    return {"acts_in": "rig", "rig": change, "signal": None}
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"signal": lambda time, angles, c: angles[..., 0]}, "signal of shape"),
-        ({"acts_in": "rig", "rig": lambda rig, c: c}, "must return a Rig"),
-        ({"acts_in": "rig", "rig": lambda rig, c: rig._replace(fill=0.05)}, "fill of shape"),
-        (
-            {"acts_in": "rig", "rig": lambda rig, c: rig._replace(path=rig.path * np.nan)},
-            "path must be finite.*wind",
-        ),
+        ({"signal": lambda time, angles, c: angles[..., 0]}, r"signal returned shape \(4, 61\)"),
+        ({"signal": lambda time, angles, c: angles + np.nan}, "signal returned .*not finite"),
+        ({"signal": lambda time, angles, c: angles + c}, "hook signal fails.*ValueError"),
+        ({"signal": lambda time, angles, c: 2.0 * angles}, "at the neutral coefficient 0"),
+        ({"signal": doubled_in_place}, "signal writes into its arguments"),
+        ({"signal": late_time}, "signal writes into its arguments"),
+        ({"signal": lambda angles: angles}, "hook signal fails.*TypeError"),
+        (rig_of(lambda rig, c: c), "must return a Rig, got ndarray"),
+        (rig_of(lambda rig, c: rig._replace(fill=0.05)), r"rig returned shape \(\)"),
+        (rig_of(lambda rig, c: rig._replace(path=rig.path * np.nan)), "not finite"),
+        (rig_of(lambda rig, c: rig._replace(fill=rig.fill * c)), "changes a value by 0.05"),
+        ({"acts_in": "liquid", "wetting": lambda cosine, c: cosine[:1] + c[:1]}, "wetting"),
+        ({"acts_in": "liquid", "make_rheology": lambda: 1 / 0}, "make_rheology fails: ZeroDiv"),
+        ({"acts_in": "liquid", "make_rheology": lambda: None}, "must return a ti.func"),
+        ({"make_prior": lambda: 3.0}, "must return a numpyro distribution, got 3.0"),
+        ({"make_prior": lambda: 1 / 0}, "make_prior fails: ZeroDiv"),
+        ({"make_prior": lambda: dist.Poisson(3.0)}, "one continuous number"),
+        ({"make_prior": lambda: dist.Normal(np.zeros(2), 1.0)}, "one continuous number"),
+        ({"make_prior": lambda: dist.Uniform(0.1, 1.0)}, "neutral coefficient 0.0 no density"),
+        ({"make_prior": lambda: dist.LogNormal(0.0, 0.1)}, "neutral coefficient 0.0 no density"),
+        ({"make_prior": lambda: dist.LogNormal(0.0, 1e4), "neutral": 1.0}, "draws must be finite"),
+        ({"make_prior": lambda: dist.ImproperUniform(dist.constraints.real, (), ())}, "sampled"),
+        ({"lowest": 0.0}, "% of the prior lies outside of lowest=0"),
+        ({"lowest": -0.1, "highest": 0.1}, "% of the prior lies outside"),
     ],
 )
-def test_a_hook_that_returns_nonsense_is_named(stir, register, changes, message):
-    register(outside(**changes))
+def test_register_tries_prior_hooks_and_neutral_value(register, changes, message):
+    with pytest.raises(ValueError, match=f"effect 'wind': .*{message}"):
+        register(outside(**changes))
+    assert "wind" not in models.EFFECTS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("base", "slope", "message"), [(1.0, -1e6, "not negative"), (2.0, 0.1, "makes .*neutral")]
+)
+def test_a_rheology_is_tried_before_a_scene_is_compiled(stir, register, base, slope, message):
+    def make():
+        import taichi as ti
+
+        @ti.func
+        def changed(viscosity, shear_rate, time, coefficient):
+            return viscosity * (base + slope * coefficient * shear_rate)
+
+        return changed
+
+    register(outside(acts_in="liquid", signal=None, make_rheology=make))
+    with pytest.raises(ValueError, match=f"effect 'wind': .*{message}"):
+        stir({"wind": 1.0})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("late", "message"),
+    [
+        ({"signal": lambda time, angles, c: angles[..., :1]}, "signal of shape"),
+        (rig_of(lambda rig, c: rig._replace(fill=rig.fill[:1])), "fill of shape"),
+        (rig_of(lambda rig, c: rig._replace(path=rig.path * np.nan)), "path must be finite.*wind"),
+    ],
+)
+def test_a_hook_that_returns_nonsense_later_is_named(stir, register, monkeypatch, late, message):
+    monkeypatch.setattr(registry, "check_effect", lambda effect: None)
+    register(outside(**late))
     with pytest.raises(ValueError, match=message):
         stir({"wind": 1.0})
