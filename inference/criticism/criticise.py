@@ -19,7 +19,7 @@ from .held_out import Gap, Suggestion, gap, holds, suggest
 from .hypothesis import Hypothesis, Interval, Weighted, weighted_posterior
 from .misfit import Found, confusion, locate, null_draws
 from .power import Sensitivity, sensitivity
-from .search import Base, Search, examine, explain
+from .search import Base, examine, explain, unsought
 from .study import AllRunsFailed, Plan, Report, Study, silent
 from .verdict import (
     REJECTION_LEVEL,
@@ -230,9 +230,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         candidates: list[Candidate] = []
         if accept is not None or base.check.p_value < level:
             candidates = _explanations(study, base, accept, held_out)
-        # where nothing was looked for, the first fits say how probable each effect is
-        fitted = candidates or [replace(one, refitted=True) for one in Search(study, base).singles]
-        probability = probabilities(base.check, fitted, len(extensions))
+        probability = probabilities(base.check, candidates or unsought(base), len(extensions))
         verdict = conclude(base.check, candidates, probability, level)
         members = remaining(probability, candidates)
         rivals = _rivals(verdict, candidates, members)
@@ -332,15 +330,21 @@ def _gaps(
         for model, made in zip(models[1:], after, strict=True):
             if not len(made):
                 failed.setdefault(model.names, made.error)
-        gaps = {
-            model.names: (
-                *gaps[model.names],
-                gap(one, before.signals[:, there], made.signals[:, there], seed),
-            )
+        neutral = before.signals[:, there]
+        acting = {
+            model.names: made.signals[:, there]
             for model, made in zip(models[1:], after, strict=True)
             if model.names not in failed
         }
+        gaps = {
+            names: (*gaps[names], gap(one, neutral, made, seed, _without(acting, names)))
+            for names, made in acting.items()
+        }
     return gaps, failed
+
+
+def _without(acting: Mapping[tuple[str, ...], np.ndarray], names: tuple[str, ...]) -> list:
+    return [made for other, made in acting.items() if other != names]
 
 
 def _check_others(name: str, given: Any, kind: type) -> None:

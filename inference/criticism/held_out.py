@@ -95,11 +95,18 @@ def holds(gaps: Sequence[Gap]) -> bool:
 
 
 @in_float64
-def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int) -> Gap:
+def gap(
+    experiment: Experiment,
+    before: np.ndarray,
+    after: np.ndarray,
+    seed: int,
+    others: Sequence[np.ndarray] = (),
+) -> Gap:
     """Compare two models' predictions, [k, n] each.
 
     Both are judged under one covariance, so that neither wins by being vague: noise, and what
-    runs at posterior draws differ by, pooled.
+    runs at posterior draws differ by, pooled. Densities, by which models are compared with one
+    another, are pooled over the `others`, too.
     """
     observed = experiment.corrected[np.isfinite(experiment.observed)]
     fewer = 1.0 + 1.0 / min(len(before), len(after))  # the mean of few runs is noisy, too
@@ -118,8 +125,9 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
     means = np.stack([before.mean(0), after.mean(0)])
     left = measures(observed - means)
     p_values = [min(1.0, 2.0 * float(exceedance(usual, seen).min())) for seen in left.T]
+    pooled = _judged(experiment.noise, experiment.observed, [before, after, *others], fewer)[0]
     covariances, log_weight = sized_covariances(experiment.noise, at)
-    density = log_densities(observed - means, [simulated + one for one in covariances], log_weight)
+    density = log_densities(observed - means, [pooled + one for one in covariances], log_weight)
     sizes = np.sqrt(np.mean((observed - means) ** 2, axis=1))
     known = np.trace(experiment.measurement.covariance(at) + simulated) / len(observed)
     return Gap(

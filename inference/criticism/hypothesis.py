@@ -110,14 +110,15 @@ class Hypothesis:
 
     @cached_property
     @in_float64
-    def sd(self) -> np.ndarray:
-        """Sds of the parameters in prior quantiles, by Laplace's approximation [d]."""
-        return np.sqrt(np.diag(np.linalg.inv(self._information)))
+    def posterior_covariance(self) -> np.ndarray:
+        """Of the parameters in prior quantiles, by Laplace's approximation [d, d]."""
+        # a uniform quantile has the variance 1/12
+        return np.linalg.inv(self.slopes.T @ self.slopes + 12.0 * np.eye(len(self.u)))
 
     @property
-    def _information(self) -> np.ndarray:
-        # a uniform quantile has the variance 1/12
-        return self.slopes.T @ self.slopes + 12.0 * np.eye(len(self.u))
+    def sd(self) -> np.ndarray:
+        """Sds of the parameters in prior quantiles [d]."""
+        return np.sqrt(np.diag(self.posterior_covariance))
 
     @in_float64
     def whiten(self, rows: np.ndarray) -> np.ndarray:
@@ -149,11 +150,13 @@ class Hypothesis:
         own, of_base = log_densities(rows, covariances, base.log_weight)
         return float(own - of_base)
 
-    @cached_property
-    @in_float64
-    def log_volume(self) -> float:
-        """Log of the share of the prior's quantiles that the posterior fills, see `sd`."""
-        return -0.5 * float(np.linalg.slogdet(self._information / (2.0 * np.pi))[1])
+    @property
+    def occam(self) -> float:
+        """Log of the share of the coefficients' prior that explains the data as well as the best;
+        what the other parameters cost is the same without them."""
+        first = len(self.u) - len(self.names)
+        of_coefficients = self.posterior_covariance[first:, first:]
+        return 0.5 * float(np.linalg.slogdet(2.0 * np.pi * of_coefficients)[1])
 
 
 @in_float64

@@ -50,8 +50,7 @@ def sensitivity(
         return abs(float(prior.from_unit(point)[name]) - neutral)
 
     odds = CREDIBLE / (1.0 - CREDIBLE) * PRIOR.none / (PRIOR.one / effects)
-    share = single.log_volume - base.log_volume
-    needed = np.sqrt(2.0 * (np.log(odds) - share)) + ndtri(POWER)
+    needed = np.sqrt(2.0 * (np.log(odds) - single.occam)) + ndtri(POWER)
     found = []
     for side in (-1, 1):
         u = zero + side * STEPS

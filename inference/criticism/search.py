@@ -63,7 +63,7 @@ def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Prio
         before, fitted = fitted, study.hypothesis((), runs, whole)
         if settled(0.5 * (before.misfit(fitted) - fitted.misfit(fitted)), fitted, box):
             break
-        box = PriorBox.around(fitted.u, fitted.sd, LATER_HALF_WIDTH)
+        box = PriorBox.around(fitted.u, fitted.sd, LATER_HALF_WIDTH / 2**attempt)
     return fitted, runs, first
 
 
@@ -208,6 +208,19 @@ def explain(study: Study, base: Base, accept: Sequence[str] | None = None) -> li
     return list(search.found.values())
 
 
+def unsought(base: Base) -> list[Candidate]:
+    """Explanations by one effect where none was looked for; first fits tell less than scores."""
+
+    def gain(name: str) -> float:
+        score, side = base.check.scores.get(name, 0.0), base.signatures[name].side
+        return 0.5 * (max(side * score, 0.0) if side else score) ** 2
+
+    return [
+        Candidate(one, base.check, gain(name), one.occam, refitted=True)
+        for name, one in base.singles.items()
+    ]
+
+
 class Search:
     """The explanations that were fitted so far, and the runs that they were learned from."""
 
@@ -226,11 +239,10 @@ class Search:
         """The extended model, tested."""
         base = self.base.hypothesis
         tested, _ = self.study.check(hypothesis, self.base.signatures)
-        occam = hypothesis.log_volume - base.log_volume
-        return Candidate(hypothesis, tested, hypothesis.gain(base), occam, refitted)
+        return Candidate(hypothesis, tested, hypothesis.gain(base), hypothesis.occam, refitted)
 
     def visit(
-        self, phase: str, candidates: Sequence[Candidate], count: int
+        self, phase: str, candidates: Sequence[Candidate], count: int, narrowing: int = 0
     ) -> dict[tuple[str, ...], PriorBox]:
         """Simulate each of them near its optimum, all in one call, and fit it again.
 
@@ -244,7 +256,7 @@ class Search:
             # what is best at the end of what was simulated is looked for well beyond
             near = one.refitted or phase != LOOK
             near = near and fitted.within.encloses(fitted.u)
-            least = LATER_HALF_WIDTH if near else FIRST_HALF_WIDTH
+            least = LATER_HALF_WIDTH / 2**narrowing if near else FIRST_HALF_WIDTH
             boxes[one.names] = PriorBox.around(fitted.u, fitted.sd, least)
         left = study.plan.most - (len(self.runs) - self.counted)
         if self.limited:
@@ -265,7 +277,7 @@ class Search:
         for attempt in range(REFIT_PASSES):
             before = {one.names: one.gain for one in candidates}
             count = max(self.study.plan.refit, FULL_PASS // max(len(candidates), 1))
-            boxes = self.visit(f"refit {attempt}", candidates, count)
+            boxes = self.visit(f"refit {attempt}", candidates, count, attempt)
             for names in boxes:
                 self.found[names] = replace(self.found[names], refitted=True)
             tried = sorted((self.found[names] for names in boxes), key=lambda one: -one.gain)

@@ -28,6 +28,7 @@ FAR_BEHIND = 0.5  # of the best gain, below which one that does not pass is not 
 TIE_MARGIN = 4.0  # log likelihood by which one explanation must excel another
 CREDIBLE = 0.9  # probability that the right explanation is among those that are named
 WRONG_P = 0.01  # so that a p-value of 0.01 is as probable under a right and a wrong explanation
+P_VALUE_STEP = 3.0 / (REPLICATES + 1.0)  # the smallest of a test that looks at two statistics
 NONE, OTHER = "none", "none of these"
 
 
@@ -132,7 +133,8 @@ def near_best(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
 def probabilities(base: Check, candidates: Sequence[Candidate], effects: int) -> dict[str, float]:
     """Probability of "none", of each explanation and of "none of these".
 
-    What held-out data contradict, and what passes but was not refitted, counts as none of these.
+    What passes but was not refitted counts as none of these; what held-out data contradict has no
+    probability.
 
     Args:
         base: Test of the base model, "none".
@@ -142,7 +144,8 @@ def probabilities(base: Check, candidates: Sequence[Candidate], effects: int) ->
     gaps = next((one.gaps for one in candidates if one.gaps), ())
     share = {1: PRIOR.one / effects, 2: PRIOR.two / max(effects * (effects - 1) / 2, 1)}
     names = [NONE, *(label(one.names) for one in candidates)]
-    counts = [True, *(one.held and (one.refitted or not one.passes) for one in candidates)]
+    held = np.array([True, *(one.held for one in candidates)])
+    possible = held & [True, *(one.refitted or not one.passes for one in candidates)]
     prior = [PRIOR.none, *(share.get(len(one.names), share[2]) for one in candidates)]
     evidence = [0.0, *(one.evidence for one in candidates)]
     log_weight = np.log(prior) + evidence
@@ -150,16 +153,16 @@ def probabilities(base: Check, candidates: Sequence[Candidate], effects: int) ->
     tests = [(base.p_value, *(gap.p_before for gap in gaps))]
     tests += [(one.check.p_value, *(gap.p_value for gap in one.gaps)) for one in candidates]
     joint = weight * [_fit_ratio(some) for some in tests]
-    other = PRIOR.other / (1.0 - PRIOR.other) * weight.sum() + joint[~np.array(counts)].sum()
-    joint = np.append(np.where(counts, joint, 0.0), other)
+    other = PRIOR.other / (1.0 - PRIOR.other) * weight @ held
+    other += joint @ (held & ~possible)
+    joint = np.append(joint * possible, other)
     return dict(zip([*names, OTHER], (joint / joint.sum()).tolist(), strict=True))
 
 
 def _fit_ratio(p_values: Sequence[float]) -> float:
     """Probability of the smallest of several p-values if an explanation is right, over that if it
-    is wrong; both are of a whole step of the bootstrap, since smaller p-values are not told
-    apart."""
-    step = len(p_values) / (REPLICATES + 1.0)
+    is wrong; both are of a whole step, since the bootstrap does not tell smaller ones apart."""
+    step = P_VALUE_STEP * len(p_values)
     p = float(np.clip(len(p_values) * min(p_values), step, 1.0))
     return step / (p**WRONG_P - max(p - step, 0.0) ** WRONG_P)
 

@@ -43,11 +43,10 @@ def test_the_smallest_size_is_found_with_its_power(found):
     """Its log likelihood, half the square of a normal about its signal-to-noise ratio, makes "none"
     incredible: more seldom for a tenth less, more often for a tenth more."""
     size, single = found.sensitivities["slope"].smallest, found.base.singles["slope"]
-    occam = single.log_volume - found.base.hypothesis.log_volume
 
     def share(of):
         z = of * size * visible("slope") + np.random.default_rng(0).normal(size=4000)
-        made = [candidate("slope", gain=0.5 * one**2, occam=occam) for one in z]
+        made = [candidate("slope", gain=0.5 * one**2, occam=single.occam) for one in z]
         none = [probabilities(FITS, [one], len(EXTENSIONS))[NONE] for one in made]
         return np.mean(np.array(none) < 1.0 - CREDIBLE)
 
