@@ -2,9 +2,11 @@
 
 import data_sets
 import numpy as np
+import others
 import pytest
 import table
 from kept import keep, results
+from scipy.stats import multivariate_normal
 from subject import alone, distance, signal_to_noise, size, two_sided, whitener
 from subjects import SUBJECTS
 
@@ -109,6 +111,34 @@ def test_every_kind_is_among_the_first_sets(subject):
     assert kinds.count("") == data_sets.NULLS
     assert any(two_sided(one) for one in subject.extensions.values())
     assert not all(two_sided(one) for one in subject.extensions.values())
+
+
+# Other methods.
+
+
+def test_leave_one_out_is_each_value_given_the_others():
+    rng = np.random.default_rng(0)
+    slopes, noise = rng.normal(size=(6, 2)), np.diag(rng.uniform(0.5, 2.0, 6))
+    fitted = others.Fitted(rng.normal(size=2), np.eye(2), rng.normal(size=6), slopes)
+    data, (mean, covariance) = rng.normal(size=6), fitted.marginal(noise)
+    whole = multivariate_normal.logpdf(data, mean, covariance)
+    without = [np.delete(np.arange(6), k) for k in range(6)]
+    expected = sum(
+        whole - multivariate_normal.logpdf(data[k], mean[k], covariance[np.ix_(k, k)])
+        for k in without
+    )
+    assert others.leave_one_out(data, fitted, noise) == pytest.approx(expected)
+
+
+def test_the_best_fit_of_a_model_that_lacks_nothing_leaves_the_noise():
+    one = data_sets.make("oscillator", 0)
+    found, noise = others.models(one)
+    white = np.linalg.inv(np.linalg.cholesky(noise))
+    left = np.sum((white @ (one.observed.ravel() - found["none"].mean)) ** 2)
+    freedom = len(noise) - 2
+    assert abs(left - freedom) < 4.0 * np.sqrt(2.0 * freedom)
+    assert np.abs(found["none"].z).max() < others.FAR
+    assert others.discrepancy(one, found["none"], noise) < 0.5
 
 
 # Tables.

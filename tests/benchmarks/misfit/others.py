@@ -33,11 +33,13 @@ from scipy.optimize import least_squares
 from scipy.special import logsumexp, ndtr
 from scipy.stats import multivariate_normal
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parent))
 
 from bolfi_liquids.inference.criticism.experiment import extended
 from data_sets import DataSet, files
 from kept import keep, results
+from machine import machine
 from subject import Subject, Trial
 from subjects import SUBJECTS
 
@@ -281,11 +283,12 @@ def examine(one: DataSet) -> dict:
 
 def run(folder: Path, path: Path, workers: int, first: int | None) -> Iterator[dict]:
     """Finish the comparison; yields each data set's result as it is kept."""
-    done = {(r["subject"], r["number"]) for r in results(path)}
+    done, made = {(r["subject"], r["number"]) for r in results(path)}, machine()
     for sets in files(folder):
         left = [one for one in sets[:first] if (one.subject, one.number) not in done]
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
             for result in pool.map(examine, left, chunksize=4):
+                result["made"] = made
                 keep(path, result)
                 yield result
 

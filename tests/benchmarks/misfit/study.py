@@ -18,11 +18,13 @@ from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parent))
 
 from bolfi_liquids.inference import criticism
 from data_sets import DataSet, files
 from kept import keep, results
+from machine import machine
 from subject import alone
 from subjects import SUBJECTS
 
@@ -52,7 +54,7 @@ def examine(one: DataSet) -> dict:
         "named": list(found.verdict.effects),
         "tied": [list(names) for names in found.tied],
         "compared": [list(names) for names in found.gaps],
-        "probabilities": dict(getattr(found, "probabilities", {})),
+        "probabilities": dict(found.probabilities),
         "intervals": {name: list(interval) for name, interval in found.coefficients.items()},
         "gap": _gap(found, one),
         "simulations": found.simulations,
@@ -99,8 +101,10 @@ def run(folder: Path, path: Path, workers: int, first: int | None) -> Iterator[d
     sets = [one for file in files(folder) for one in file[:first]]
     left = [one for one in sets if (one.subject, one.number) not in done]
     left.sort(key=lambda one: one.number)
+    made = machine()
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         for result in pool.map(examine, left, chunksize=4):
+            result["made"] = made
             keep(path, result)
             yield result
 

@@ -47,7 +47,12 @@ def tied(result: Result) -> bool:
 
 
 def detected(result: Result) -> bool:
-    """Whether the base model was rejected."""
+    """Whether the verdict is that something is missing."""
+    return result["verdict"] != "none"
+
+
+def rejected(result: Result) -> bool:
+    """Whether the base model was, by its p-value."""
     return result["p_value"] < LEVEL
 
 
@@ -90,6 +95,7 @@ def row(label: str, found: Sequence[Result]) -> str:
     cells = [
         str(len(found)),
         f"{sum(map(detected, of.nulls))} of {len(of.nulls)}",
+        f"{sum(map(rejected, of.nulls))}",
         f"{share([right(r) for r in strong])} of {len(strong)}",
         f"{sum(map(tied, ties))} of {len(ties)}",
         f"{sum(map(wrong, of.singles))} of {len(of.singles)}",
@@ -102,8 +108,9 @@ def row(label: str, found: Sequence[Result]) -> str:
 
 
 HEAD = (
-    "subject | sets | false alarms | right alone, SNR over 10 | ties with the truth, SNR 5 to 10 | "
-    "wrong name | outside, named | interval covers | gap halved | crashes"
+    "subject | sets | false alarms | p < .05 | right alone, SNR over 10 | "
+    "ties with the truth, SNR 5 to 10 | wrong name | outside, named | interval covers | "
+    "gap halved | crashes"
 )
 
 
@@ -182,7 +189,7 @@ def exact_band(hits: int, count: int) -> tuple[float, float]:
 
 def calibration(found: Sequence[Result]) -> list[str]:
     """The most probable explanation's stated probability, and how often it is right."""
-    stated = [(probabilities(r), truth(r)) for r in found if r.get("probabilities")]
+    stated = [(probabilities(r), truth(r)) for r in found]
     best = [max(p, key=lambda one: p[one]) for p, _ in stated]
     top = np.array([p[one] for (p, _), one in zip(stated, best, strict=True)])
     hit = np.array([one == true for (_, true), one in zip(stated, best, strict=True)], bool)
@@ -198,25 +205,41 @@ def calibration(found: Sequence[Result]) -> list[str]:
     return rows
 
 
+def made(found: Sequence[Result]) -> list[str]:
+    """When, where and of which code."""
+    return [*sorted({f"- {r['made']}" for r in found}), ""]
+
+
 def table(found: Sequence[Result]) -> str:
     """Markdown."""
     names = sorted({r["subject"] for r in found})
     by_subject = {name: [r for r in found if r["subject"] == name] for name in names}
-    lines = [*heading(HEAD), *(row(name, those) for name, those in by_subject.items())]
-    lines.append(row("all", found))
-    for name, those in {**by_subject, "all": found}.items():
+    by_subject["all"] = list(found)
+    lines = [*made(found), *heading(HEAD), *(row(name, of) for name, of in by_subject.items())]
+    for name, those in by_subject.items():
         of = Kinds(those)
         lines += ["", f"### {name}", "", *by_ratio(of.singles), ""]
         lines += [hidden_behind_rivals(of.singles), of_pairs(of.pairs)]
-        if any(r["probabilities"] for r in of.found):
-            score = np.mean([brier(r) for r in of.found])
-            lines += ["", f"Brier score {score:.3f}; the most probable explanation:", ""]
-            lines += calibration(of.found)
+        score = np.mean([brier(r) for r in of.found])
+        lines += ["", f"Brier score {score:.3f}; the most probable explanation:", ""]
+        lines += calibration(of.found)
     return "\n".join(lines)
 
 
-def of_others(found: Sequence[Result]) -> str:
-    """Markdown: what each other method detects and names."""
+def joined(found: Sequence[Result], others: Sequence[Result]) -> list[Result]:
+    """What other methods make of the sets that criticism was tried on, and criticism itself."""
+    ours = {(r["subject"], r["number"]): r for r in found if "crash" not in r}
+    both = [r for r in others if (r["subject"], r["number"]) in ours]
+    for r in both:
+        our = ours[r["subject"], r["number"]]
+        r["detects"]["criticism"] = detected(our)
+        if our["verdict"] == "effect":
+            r["names"]["criticism"] = JOIN.join(our["named"])
+    return both
+
+
+def side_by_side(found: Sequence[Result]) -> str:
+    """Markdown: what each method detects and names; see `joined`."""
     nulls = [r for r in found if r["truth"] == "none"]
     outside = [r for r in found if r["truth"] == "none of these"]
     singles = [r for r in found if r not in nulls and r not in outside and len(r["effects"]) == 1]
@@ -247,7 +270,7 @@ def of_others(found: Sequence[Result]) -> str:
             cells, last = [*cells, "-", "-", "-"], "-"
         cells += [share([alarm(r) for r in outside]), last]
         rows.append(f"| {method} | {' | '.join(cells)} |")
-    return "\n".join(rows)
+    return "\n".join([*made(found), *rows])
 
 
 if __name__ == "__main__":
@@ -257,4 +280,5 @@ if __name__ == "__main__":
     asked = parser.parse_args()
     print(table(results(asked.study)))
     if asked.others:
-        print(f"\n### other methods\n\n{of_others(results(asked.others))}")
+        both = joined(results(asked.study), results(asked.others))
+        print(f"\n### other methods\n\n{side_by_side(both)}")
