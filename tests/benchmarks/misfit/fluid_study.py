@@ -103,14 +103,15 @@ def examine(one: Set, bank: inference.SimulationBank) -> dict:
         found = _criticised_stirs(truth, rng, bank)
     gaps = found.gaps.get(found.accepted, ())
     return {
-        "effect": effect,
+        "effects": [effect] if effect else [],
         "number": number,
-        "truth": truth,
+        "theta": truth,
         "snr": _snr(found, effect, truth) if effect else 0.0,
         "p_value": found.base.check.p_value,
         "verdict": found.verdict.kind,
-        "effects": list(found.verdict.effects),
-        "interval": list(found.coefficients[effect]) if effect in found.accepted else None,
+        "named": list(found.verdict.effects),
+        "probabilities": dict(found.probabilities),
+        "intervals": {name: list(interval) for name, interval in found.coefficients.items()},
         "gaps": [[gap.before, gap.after, gap.noise] for gap in gaps],
         "simulations": found.simulations,
         "seconds": time.perf_counter() - started,
@@ -233,7 +234,7 @@ def main() -> None:
     folder = parser.parse_args().out
     folder.mkdir(exist_ok=True)
     kept = folder / "results.jsonl"
-    done = {(r["effect"], r["number"]) for r in results(kept)}
+    done = {("".join(r["effects"]), r["number"]) for r in results(kept)}
     with inference.SimulationBank(folder / "simulations.sqlite") as bank:
         for one in all_sets():
             if one not in done:

@@ -9,7 +9,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 from kept import results
-from table import Result, right, tied, wrong
+from table import Result, covered, right, tied, wrong
 
 VISIBLE = 10.0  # signal-to-noise ratio
 
@@ -25,7 +25,6 @@ def halved(result: Result) -> bool:
 def row(label: str, those: list[Result]) -> str:
     """Of data sets in which the same acts."""
     named = [r for r in those if right(r)]
-    covered = [r for r in named if r["interval"][1] <= r["truth"][r["effect"]] <= r["interval"][2]]
     counts = [
         len(those),
         len(named),
@@ -33,17 +32,17 @@ def row(label: str, those: list[Result]) -> str:
         sum(wrong(r) for r in those),
         sum(r["verdict"] in ("none", "unknown") for r in those),
         f"{sum(halved(r) for r in named)} of {len(named)}",
-        f"{len(covered)} of {len(named)}",
+        f"{sum(all(covered(r)) for r in named)} of {len(named)}",
     ]
     return f"| {label} | {' | '.join(map(str, counts))} |"
 
 
 def table(found: list[Result]) -> str:
     """Markdown."""
-    nulls = [r for r in found if not r["effect"]]
-    visible = [r for r in found if r["effect"] and r["snr"] >= VISIBLE]
-    faint = [r for r in found if r["effect"] and r["snr"] < VISIBLE]
-    names = list(dict.fromkeys(r["effect"] for r in visible))
+    nulls = [r for r in found if not r["effects"]]
+    visible = [r for r in found if r["effects"] and r["snr"] >= VISIBLE]
+    faint = [r for r in found if r["effects"] and r["snr"] < VISIBLE]
+    names = list(dict.fromkeys(r["effects"][0] for r in visible))
     headings = "effect | sets | right | tie with it | wrong | none | gap halved | interval covers"
     return "\n".join(
         [
@@ -52,7 +51,7 @@ def table(found: list[Result]) -> str:
             "",
             f"| {headings} |",
             "|-|-|-|-|-|-|-|-|",
-            *(row(name, [r for r in visible if r["effect"] == name]) for name in names),
+            *(row(name, [r for r in visible if r["effects"] == [name]]) for name in names),
             row("all", visible),
         ]
     )

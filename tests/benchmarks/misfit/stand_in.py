@@ -5,9 +5,9 @@ as an eddy of another. Runs differ by their seed: a smooth error of .15 degrees 
 packing of particles, and is in the data as well.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +16,7 @@ import numpyro.distributions as dist
 from bolfi_liquids.hardware.motion import star
 from bolfi_liquids.inference import criticism
 from scipy.ndimage import gaussian_filter1d
+from subject import Columns, Subject, alone, in_lanes
 
 from bolfi_liquids import inference
 
@@ -44,10 +45,15 @@ EXTENSIONS = {
 }
 """What the model may lack, and knows of."""
 
-UNKNOWN = ("rotation", "slosh", "swirl", "settling")
+OUTSIDE = {
+    "rotation": criticism.Extension(dist.Normal(0.0, 0.2)),
+    "slosh": criticism.Extension(dist.Normal(0.0, 5.0)),
+    "swirl": criticism.Extension(dist.Normal(0.0, 50.0)),
+    "settling": criticism.Extension(dist.HalfNormal(0.15)),
+}
 """What it may lack, and does not know of."""
 
-_NAMES = (*PRIOR.names, *EXTENSIONS, *UNKNOWN)
+_NAMES = (*PRIOR.names, *EXTENSIONS, *OUTSIDE)
 
 
 @dataclass(frozen=True)
@@ -63,30 +69,27 @@ class Stir:
         """Of the samples [s], shape [240]."""
         return np.arange(0.0, DURATION, 1.0 / 30.0)
 
-    def simulate(self, theta: dict[str, np.ndarray], seeds: np.ndarray) -> np.ndarray:
+    def simulate(self, theta: Columns, seeds: np.ndarray) -> np.ndarray:
         """Inclinations [b, 240, 2] in rad, each with the error of its seed."""
-        return self.exact(theta, len(seeds)) + np.stack([self._jitter(s, theta) for s in seeds])
+        return self.expected(theta) + np.stack([self._jitter(seed) for seed in seeds])
 
-    def exact(self, theta: dict[str, np.ndarray], n: int) -> np.ndarray:
+    def expected(self, theta: Columns) -> np.ndarray:
         """Without the error of a seed."""
-        values = np.zeros((n, len(_NAMES)), np.float32)
-        for name, column in theta.items():
-            values[:, _NAMES.index(name)] = column
-        padded = np.zeros((-(-n // 16) * 16, len(_NAMES)), np.float32)
-        padded[:] = values[0]
-        padded[:n] = values
-        angles = [
-            _swing(jnp.asarray(self._driven), part) for part in np.split(padded, len(padded) // 16)
-        ]
-        return np.concatenate(angles)[:n].astype(float)
+        return in_lanes(partial(_swing, jnp.asarray(self._driven)), _NAMES, theta)
 
-    def observe(self, theta: dict[str, float], seed: int) -> np.ndarray:
+    def observe(self, theta: Mapping[str, float], seed: int) -> np.ndarray:
         """What cameras see of one more stir, [240, 2] in rad."""
         rng = np.random.default_rng([seed, 1])
-        columns = {name: np.array([value]) for name, value in theta.items()}
-        return self.simulate(columns, np.array([seed]))[0] + camera_noise(rng, len(self.time))
+        return self.simulate(alone(theta), np.array([seed]))[0] + camera_noise(rng, len(self.time))
 
-    def _jitter(self, seed: int, theta: Any) -> np.ndarray:
+    def covariance(self, theta: Mapping[str, float]) -> np.ndarray:
+        """Of the cameras' noise and of a run's error [480, 480], while the liquid moves."""
+        samples = np.arange(len(self.time))
+        lag = np.abs(np.subtract.outer(samples, samples))
+        smooth = np.exp(-0.5 * (lag / (30.0 * JITTER_TIME)) ** 2)
+        return np.kron(NOISE**2 * CORRELATION**lag + JITTER**2 * smooth, np.eye(2))
+
+    def _jitter(self, seed: int) -> np.ndarray:
         white = np.random.default_rng([int(seed), 2]).normal(size=(len(self.time), 2))
         smooth = gaussian_filter1d(white, JITTER_TIME * 30.0 / np.sqrt(2.0), axis=0, mode="wrap")
         size = JITTER * np.sqrt(2.0 * np.sqrt(np.pi) * JITTER_TIME * 30.0 / np.sqrt(2.0))
@@ -177,9 +180,19 @@ def _seen(angles: jax.Array, of: dict[str, jax.Array]) -> jax.Array:
     return turned + tilt + of["drift"] * time[:, None]
 
 
-def covariance() -> np.ndarray:
-    """Of one channel's noise and of a run's error [240, 240], while the liquid moves."""
-    samples = np.arange(int(DURATION * 30))
-    lag = np.abs(np.subtract.outer(samples, samples))
-    smooth = np.exp(-0.5 * (lag / (30.0 * JITTER_TIME)) ** 2)
-    return NOISE**2 * CORRELATION**lag + JITTER**2 * smooth
+def rest_noise(observed: list[np.ndarray]) -> criticism.Noise:
+    """The cameras' noise, from the rests of several data sets, as for recordings."""
+    return criticism.rest_noise([one[: int(REST * 30)] for one in observed], trend=2)
+
+
+SUBJECT = Subject(
+    name="stir",
+    prior=PRIOR,
+    extensions=EXTENSIONS,
+    outside=OUTSIDE,
+    fitted=Stir(),
+    held_out=Stir(points=7, radius=0.02, speed=0.08),
+    noise=rest_noise,
+    settings="inclination [rad] in two planes, 30 samples a second, at rest for 2 s; fitted: a "
+    "star of 9 points, 25 mm and 0.1 m/s; held out: 7 points, 20 mm and 0.08 m/s",
+)

@@ -1,6 +1,6 @@
-"""How often criticism is right: 1196 data sets of the stand-in simulator.
+"""How often criticism is right, on the data sets of every subject.
 
-    python tests/benchmarks/misfit/study.py --out study.jsonl --workers 2
+    python tests/benchmarks/misfit/study.py misfit_sets --out study.jsonl --workers 2
 
 Each line of the file is one data set; a study that was interrupted goes on where it stopped.
 `table.py` makes a table of it.
@@ -10,159 +10,111 @@ import argparse
 import os
 import sys
 import time
+import traceback
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import least_squares, root_scalar
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parent))
 
-import stand_in
 from bolfi_liquids.inference import criticism
+from data_sets import DataSet, files
 from kept import keep, results
-from stand_in import EXTENSIONS, NOISE, PRIOR, REST, UNKNOWN, Stir
+from machine import machine
+from subject import alone
+from subjects import SUBJECTS
 
-STRENGTHS = (2.5, 6.0)  # RMS of what the effect changes, over the cameras' noise
-NULLS, SETS, OUTSIDE_SETS = 300, 50, 12
-FIRST, SECOND = Stir(), Stir(points=7, radius=0.02, speed=0.08)
-LARGEST = 0.99  # quantile of a coefficient's prior: what is stronger is not looked for
 DRAWS = 8  # of a posterior, for its expectation
-MOVES = int(REST * 30)  # the first sample of which the gripper moves
-TREND = 2  # degree of what noise at rest is told from, as for recordings
-
-Set = tuple[str, float, int]
-"""Effect ("" for none), strength, number."""
 
 
-def all_sets() -> list[Set]:
-    """Every data set, the kinds interleaved, so that an early table shows all of them."""
-    sets = [("", 0.0, i) for i in range(NULLS)]
-    for strength in STRENGTHS:
-        sets += [(name, strength, i) for name in EXTENSIONS for i in range(SETS)]
-        sets += [(name, strength, i) for name in UNKNOWN for i in range(OUTSIDE_SETS)]
-    return sorted(sets, key=lambda one: one[2] / (SETS if one[0] else NULLS))
-
-
-def examine(one: Set) -> dict:
-    """Make a data set, criticise the base model on it, and say how that went."""
+def examine(one: DataSet) -> dict:
+    """Criticise the base model on a data set, and say how that went."""
     started = time.perf_counter()
-    effect, strength, number = one
-    seed = int(
-        np.random.SeedSequence([number, int(10 * strength), *effect.encode()]).generate_state(1)[0]
-        >> 1
-    )
-    rng = np.random.default_rng(seed)
-    base = {"drag": float(np.exp(rng.uniform(*np.log([0.8, 5.0])))), "eddy": rng.uniform(0.1, 0.5)}
-    coefficient = _coefficient(base, effect, strength, rng) if effect else 0.0
-    truth = {**base, effect: coefficient} if effect else base
-    seed, *seeds = (int(one) for one in rng.integers(2**31, size=3))
-
-    first, second = FIRST.observe(truth, seeds[0]), SECOND.observe(truth, seeds[1])
-
-    def experiment(stir: Stir, label: str, observed: np.ndarray, *more: np.ndarray):
-        rests = [each[:MOVES] for each in (observed, *more)]
-        noise = criticism.rest_noise(rests, seed=number, trend=TREND)
-        return criticism.Experiment(stir.simulate, observed, noise, label, label)
-
-    found = criticism.criticise(
-        experiment(FIRST, "star", first),
-        PRIOR,
-        EXTENSIONS,
-        held_out=[experiment(SECOND, "other star", second, first)],
-        batch=64,
-        seed=seed,
-    )
+    known = {
+        "subject": one.subject,
+        "number": one.number,
+        "effects": list(one.effects),
+        "truth": one.truth,
+        "theta": one.theta,
+        "visible": one.visible,
+        "snr": one.snr,
+    }
+    try:
+        found = criticise(one)
+    except Exception:  # a crash is a result, and the others are still wanted
+        return {**known, "crash": traceback.format_exc()}
     return {
-        "effect": effect,
-        "strength": strength,
-        "number": number,
-        "snr": _snr(base, effect, coefficient) if effect else 0.0,
+        **known,
         "p_value": found.base.check.p_value,
         "verdict": found.verdict.kind,
-        "effects": list(found.verdict.effects),
-        "named": _before_held_out(found),
-        "coefficient": coefficient,
-        "interval": list(found.coefficients[effect]) if effect in found.accepted else None,
-        "gap": _gap(found, truth),
+        "named": list(found.verdict.effects),
+        "tied": [list(names) for names in found.tied],
+        "compared": [list(names) for names in found.gaps],
+        "probabilities": dict(found.probabilities),
+        "intervals": {name: list(interval) for name, interval in found.coefficients.items()},
+        "gap": _gap(found, one),
         "simulations": found.simulations,
         "seconds": time.perf_counter() - started,
     }
 
 
-def _coefficient(base: dict, effect: str, strength: float, rng: np.random.Generator) -> float:
-    """At which the effect changes the inclination by `strength` times the cameras' noise, or the
-    greatest that its prior thinks possible."""
-    extension = EXTENSIONS.get(effect)
-    two_sided = extension is None or np.isinf(float(extension.prior.icdf(1e-30)))
-    sign = float(rng.choice([-1.0, 1.0])) if two_sided and effect != "settling" else 1.0
-    greatest = np.inf if extension is None else float(extension.prior.icdf(LARGEST))
-    low, high = 0.0, 1e-4
-    while _change(base, effect, sign * high) < strength:
-        if high >= greatest:
-            return sign * greatest
-        low, high = high, min(2.0 * high, greatest)
-    size = root_scalar(
-        lambda c: _change(base, effect, sign * c) - strength, bracket=(low, high), rtol=1e-3
-    ).root
-    return sign * float(size)
+def criticise(one: DataSet) -> criticism.Criticism:
+    """With the held-out experiment, and what is known of the noise."""
+    subject = SUBJECTS[one.subject]
+
+    def experiment(trial, label: str, observed: np.ndarray, *more: np.ndarray):
+        noise = subject.noise([observed, *more])
+        return criticism.Experiment(trial.simulate, observed, noise, label, label)
+
+    return criticism.criticise(
+        experiment(subject.fitted, "fitted", one.observed),
+        subject.prior,
+        subject.extensions,
+        held_out=[experiment(subject.held_out, "held out", one.held_out, one.observed)],
+        batch=64,
+        seed=one.seed,
+    )
 
 
-def _change(base: dict, effect: str, coefficient: float) -> float:
-    clean, changed = _exact(FIRST, base), _exact(FIRST, {**base, effect: coefficient})
-    return float(np.sqrt(np.mean((changed - clean) ** 2))) / NOISE
-
-
-def _exact(stir: Stir, theta: dict) -> np.ndarray:
-    return stir.exact({name: np.array([value]) for name, value in theta.items()}, 1)[0]
-
-
-def _snr(base: dict, effect: str, coefficient: float) -> float:
-    """Of the effect, less what the base parameters absorb, by the true covariance."""
-    changed = _exact(FIRST, {**base, effect: coefficient})
-    whitener = np.linalg.inv(np.linalg.cholesky(stand_in.covariance()))
-
-    def left(at: np.ndarray) -> np.ndarray:
-        theta = {"drag": float(np.exp(at[0])), "eddy": float(at[1])}
-        return (whitener @ (changed - _exact(FIRST, theta))).ravel()
-
-    ends = [np.log(0.3), 0.0], [np.log(10.0), 0.6]
-    start = [np.log(base["drag"]), base["eddy"]]
-    return float(np.sqrt(2.0 * least_squares(left, start, bounds=ends, diff_step=0.02).cost))
-
-
-def _before_held_out(found: criticism.Criticism) -> list[list[str]]:
-    """The explanations that went to the held-out data."""
-    return [list(names) for names in found.gaps]
-
-
-def _gap(found: criticism.Criticism, truth: dict) -> list[float] | None:
-    """RMS of truth less expected on the held-out stir, without any noise: before, after [deg]."""
+def _gap(found: criticism.Criticism, one: DataSet) -> list[float] | None:
+    """RMS of truth less expected on the held-out experiment, both without noise: before, after, in
+    units of the noise."""
     if found.extended is None:
         return None
-    seen = _exact(SECOND, truth)
+    trial = SUBJECTS[one.subject].held_out
+    seen, noise = (
+        trial.expected(alone(one.theta))[0],
+        np.sqrt(np.trace(trial.covariance(one.theta))),
+    )
     posteriors = criticism.weighted_posterior(found.base.hypothesis), found.posterior
-    expected = [SECOND.exact(each.draw(0, DRAWS), DRAWS).mean(0) for each in posteriors]
-    return [float(np.rad2deg(np.sqrt(np.mean((seen - one) ** 2)))) for one in expected]
+    expected = [trial.expected(each.draw(0, DRAWS)).mean(0) for each in posteriors]
+    return [float(np.linalg.norm(seen - mean) / noise) for mean in expected]
 
 
-def run(path: Path, workers: int) -> Iterator[dict]:
+def run(folder: Path, path: Path, workers: int, first: int | None) -> Iterator[dict]:
     """Finish the study; yields each data set's result as it is kept."""
-    done = {(r["effect"], r["strength"], r["number"]) for r in results(path)}
-    left = [one for one in all_sets() if one not in done]
+    done = {(r["subject"], r["number"]) for r in results(path)}
+    sets = [one for file in files(folder) for one in file[:first]]
+    left = [one for one in sets if (one.subject, one.number) not in done]
+    left.sort(key=lambda one: one.number)
+    made = machine()
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         for result in pool.map(examine, left, chunksize=4):
+            result["made"] = made
             keep(path, result)
             yield result
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sets", type=Path, help="folder that data_sets.py wrote")
     parser.add_argument("--out", type=Path, default=Path("study.jsonl"))
+    parser.add_argument("--first", type=int, help="how many sets of each subject; all by default")
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     asked = parser.parse_args()
-    total = len(all_sets())
-    for count, _ in enumerate(run(asked.out, asked.workers), len(results(asked.out)) + 1):
-        print(f"\r{count} of {total}", end="", file=sys.stderr, flush=True)
+    for count, _ in enumerate(run(asked.sets, asked.out, asked.workers, asked.first), 1):
+        print(f"\r{count}", end="", file=sys.stderr, flush=True)
