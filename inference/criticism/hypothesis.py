@@ -256,7 +256,7 @@ def log_densities(
         factor = np.linalg.cholesky(covariance)
         white = solve_triangular(factor, rows.T, lower=True)
         each.append(-0.5 * np.sum(white**2, axis=0) - np.log(np.diag(factor)).sum())
-    return logsumexp(np.array(each) + log_weight[:, None], axis=0)
+    return np.asarray(logsumexp(np.array(each) + log_weight[:, None], axis=0))
 
 
 def _reduced(surrogate: SignalSurrogate, covariances: Sequence[np.ndarray]) -> Reduced:
