@@ -326,7 +326,12 @@ class Search:
             return side * score if side else abs(score)
 
         others = sorted(best.check.scores, key=wanted, reverse=True)[: 2 * self.study.plan.refits]
-        pairs = [self.together((*best.names, other)) for other in others]
+        # in the order of the registry: one pair has one name
+        registry = list(self.study.extensions)
+        pairs = [
+            self.together(tuple(sorted((*best.names, other), key=registry.index)))
+            for other in others
+        ]
         pairs = sorted(pairs, key=lambda c: -c.gain)[: self.study.plan.refits]
         self.found |= {one.names: one for one in pairs}
         self.refit(pairs)
