@@ -49,7 +49,7 @@ def sensitivity(
         point = np.append(base.u, u)
         return abs(float(prior.from_unit(point)[name]) - neutral)
 
-    odds = CREDIBLE / (1.0 - CREDIBLE) * PRIOR.none / (PRIOR.one / effects)
+    odds = CREDIBLE / (1.0 - CREDIBLE) * PRIOR.none / PRIOR.share(1, effects)
     needed = np.sqrt(2.0 * (np.log(odds) - single.occam)) + ndtri(POWER)
     found = []
     for side in (-1, 1):

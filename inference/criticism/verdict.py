@@ -14,6 +14,7 @@ with the probability 1 - `CREDIBLE`: so it is the smallest set that holds it wit
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import comb
 
 import numpy as np
 
@@ -46,6 +47,10 @@ class Priors:
     one: float = 0.35
     two: float = 0.05
     other: float = 0.1
+
+    def share(self, acting: int, effects: int) -> float:
+        """Of one explanation by so many of the known effects."""
+        return (self.one if acting == 1 else self.two) / comb(effects, acting)
 
 
 PRIOR = Priors()
@@ -149,11 +154,10 @@ def probabilities(base: Check, candidates: Sequence[Candidate], effects: int) ->
         effects: Number of known effects, fitted or not.
     """
     gaps = next((one.gaps for one in candidates if one.gaps), ())
-    share = {1: PRIOR.one / effects, 2: PRIOR.two / max(effects * (effects - 1) / 2, 1)}
     names = [NONE, *(label(one.names) for one in candidates)]
     untested = [one.unpredicted or (one.passes and not one.refitted) for one in candidates]
     tested = ~np.array([False, *map(bool, untested)])
-    prior = [PRIOR.none, *(share.get(len(one.names), share[2]) for one in candidates)]
+    prior = [PRIOR.none, *(PRIOR.share(len(one.names), effects) for one in candidates)]
     evidence = [0.0, *(one.evidence for one in candidates)]
     log_weight = np.log(prior) + evidence
     weight = np.exp(log_weight - log_weight.max())
