@@ -8,7 +8,7 @@ Its groups, under `stirs` and, where pours were given, under `pours`:
 - `effects`: over effects, what was found out about each; `unit` is that of `typical`, `smallest`,
   `limit` and `coefficient`, `side` the sign of the scores that count, 0 where both do;
 - `explanations`: over all of them, their probabilities;
-- `confusion`: cosines between the effects' signatures;
+- `confusion`: cosines between the effects' signatures, and how much of each the other leaves;
 - `held_out`: over explanations and recordings, the gap before and after;
 - `suggestions`: over further experiments, how well each would separate the explanations, the rate
   of wrong names before and after it, and its cost.
@@ -101,7 +101,8 @@ def _groups(
             "plane": list(PLANE_NAMES),
         }
     names = list(source.base.signatures)
-    cosine = {"cosine": (("effect", "other"), source.confusion)}
+    pairs = ("effect", "other")
+    alike = {"cosine": (pairs, source.confusion), "isolability": (pairs, source.isolability)}
     groups = {
         "residual": _residual(source, dims, units).assign_coords(coords),
         "where": _where(source, units),
@@ -110,7 +111,7 @@ def _groups(
             {"probability": ("explanation", list(source.probabilities.values()))},
             coords={"explanation": list(source.probabilities)},
         ),
-        "confusion": Dataset(cosine, coords={"effect": names, "other": names}),
+        "confusion": Dataset(alike, coords={"effect": names, "other": names}),
     }
     if source.gaps:
         groups["held_out"] = _held_out(source, units)
@@ -248,9 +249,9 @@ def _held_out(source: "inference.criticism.Criticism", units: dict[str, str]) ->
         field: (
             ("explanation", "recording"),
             [[getattr(gap, field) for gap in row] for row in gaps],
-            DIMENSIONLESS if field in ("p_before", "p_value", "lpd_gain") else units,
+            DIMENSIONLESS if field in ("p_value", "lpd_gain") else units,
         )
-        for field in ("before", "after", "noise", "floor", "p_before", "p_value", "lpd_gain")
+        for field in ("before", "after", "noise", "floor", "p_value", "lpd_gain")
     }
     columns["holds"] = ("explanation", [source.holds(key) for key in source.gaps])
     labels = [gap.label for gap in gaps[0]]

@@ -16,7 +16,7 @@ from ..simulations.compute import Workers, open_compute
 from ..simulations.job import BATCH
 from .design import Suggestion, rivals_of, suggest
 from .experiment import Experiment, Extensions, Proposal, check_extensions
-from .held_out import Gap, gap, holds
+from .held_out import Gap, gap, holds, predictive_gains
 from .hypothesis import Hypothesis, Interval, Weighted, weighted_posterior
 from .misfit import Found, confusion, locate, null_draws
 from .power import Sensitivity, sensitivity
@@ -134,8 +134,12 @@ class Criticism(Displayed):
     def isolability(self) -> np.ndarray:
         """Signal-to-noise ratio of each effect, of its typical size, that no size of the other
         effect absorbs [e, e]; below about 3 the data do not tell the two apart."""
+        side = np.array([of.side for of in self.base.signatures.values()])
         snr = np.array([of.snr for of in self.base.signatures.values()])
-        return snr[:, None] * np.sqrt(np.maximum(1.0 - self.confusion**2, 0.0))
+        # of two effects that act to one side each, one may lie where the other cannot
+        opposite = np.multiply.outer(side, side) * self.confusion < 0.0
+        cosine = np.where(opposite, 0.0, self.confusion)
+        return snr[:, None] * np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
 
     @property
     def confusion(self) -> np.ndarray:
@@ -227,19 +231,21 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     with open_compute(executor, timeout, batch, bank) as compute:
         study = Study(experiment, prior, extensions, compute, plan or Plan(), seed, counted)
         base = examine(study, None if earlier is None else study.table(*earlier))
-        candidates: list[Candidate] = []
+        sought, asked = [], None
         if accept is not None or base.check.p_value < level:
-            candidates = _explanations(study, base, accept, held_out)
-        sought = [one for one in candidates if not one.requested]
-        probability = probabilities(base.check, sought or unsought(base), len(extensions))
+            sought, asked = _explanations(study, base, accept, held_out)
+        fitted = sought if base.check.p_value < level else unsought(base)
+        probability = probabilities(base.check, fitted, len(extensions))
         verdict = conclude(base.check, sought, probability, level)
         members = remaining(probability, sought)
-        rivals = _rivals(verdict, candidates, members)
+        rivals = _rivals(verdict, sought, members)
         known = rivals_of(rivals, probability, seed) if proposals else {}
         suggestions = suggest(study, proposals, known)
     named = verdict.effects if verdict.kind is VerdictKind.EFFECT else ()
     accepted = tuple(accept) if accept is not None else named
-    leading = _among(candidates, accepted)
+    leading = asked or _among(sought, accepted)
+    candidates = [one for one in sought if asked is None or one.names != asked.names]
+    candidates += [asked] if asked else []
     extended = leading.hypothesis if leading else None
     left = []
     if extended is not None:
@@ -258,7 +264,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         untested=base.untested | _left_out(candidates),
         experiment=experiment,
         units={name: one.unit for name, one in extensions.items()},
-        tied=tuple(one.names for one in members),
+        tied=tuple(one.names for one in members if verdict.kind is not VerdictKind.AGREEMENT),
         probabilities=probability,
         sensitivities={
             name: sensitivity(base.hypothesis, single, extensions[name], len(extensions))
@@ -270,17 +276,16 @@ def criticise(  # noqa: PLR0913  the one call that most users make
 
 def _explanations(
     study: Study, base: Base, accept: Sequence[str] | None, held_out: Sequence[Experiment]
-) -> list[Candidate]:
-    """Fit explanations, and test those that passed on the held-out data."""
-    candidates = explain(study, base, accept)
-    accepted = _among(candidates, accept)
-    chosen = [one for one in candidates if one.accepted or one is accepted]
-    gaps, failed = _gaps(study, base, chosen, held_out)
-    # what cannot be simulated there is not borne out there
-    return [
-        replace(one, gaps=gaps.get(one.names, ()), unpredicted=failed.get(one.names, ""))
-        for one in candidates
-    ]
+) -> tuple[list[Candidate], Candidate | None]:
+    """Fit explanations, and test those that passed on the held-out data. The one by the effects to
+    accept, if there are any, is refitted and tested besides: it changes nothing of the others."""
+    sought, asked = explain(study, base, accept)
+    chosen = [one for one in sought if one.accepted]
+    judged = _judged(study, base, chosen, held_out)
+    after = {one.names: one for one in judged}
+    if asked is not None:
+        (asked,) = _judged(study, base, [asked], held_out)
+    return [after.get(one.names, one) for one in sought], asked
 
 
 def _rivals(
@@ -311,47 +316,31 @@ def _among(candidates: Sequence[Candidate], names: Sequence[str] | None) -> Cand
     return next((c for c in candidates if names and set(c.names) == set(names)), None)
 
 
-def _gaps(
+def _judged(
     study: Study, base: Base, chosen: Sequence[Candidate], held_out: Sequence[Experiment]
-) -> tuple[dict[tuple[str, ...], tuple[Gap, ...]], dict[tuple[str, ...], str]]:
-    """Names -> gaps, of those that can be simulated for the held-out data; and names -> why, of
-    the others."""
-    count, seed = study.plan.held_out, study.seed
+) -> list[Candidate]:
+    """Explanations with their gaps on the held-out data, or why these could not be simulated."""
     if not chosen or not held_out:
-        return {}, {}
-    models = [base.hypothesis, *(candidate.hypothesis for candidate in chosen)]
+        return list(chosen)
+    count, seed = study.plan.held_out, study.seed
+    models = [base.hypothesis, *(one.hypothesis for one in chosen)]
     drawn = [weighted_posterior(model, seed).draw(seed, count) for model in models]
-    gaps: dict[tuple[str, ...], tuple[Gap, ...]] = {model.names: () for model in models[1:]}
-    failed: dict[tuple[str, ...], str] = {}
+    found = list(chosen)
     for one in held_out:
         before, *after = study.run_each(f"held out {one.label}", drawn, one)
         if not len(before):
             raise AllRunsFailed(before.error)
         there = np.isfinite(one.observed)
-        for model, made in zip(models[1:], after, strict=True):
-            if not len(made):
-                failed.setdefault(model.names, made.error)
-        neutral = before.signals[:, there]
-        acting = {
-            model.names: made.signals[:, there]
-            for model, made in zip(models[1:], after, strict=True)
-            if model.names not in failed
-        }
-        gaps = {
-            names: (*gaps[names], gap(one, neutral, made, seed, _rivals_of(names, chosen, acting)))
-            for names, made in acting.items()
-        }
-    return gaps, failed
-
-
-def _rivals_of(
-    names: tuple[str, ...],
-    chosen: Sequence[Candidate],
-    acting: Mapping[tuple[str, ...], np.ndarray],
-) -> list[np.ndarray]:
-    """Runs of the explanations beside the named one that the search itself found."""
-    found = [one.names for one in chosen if not one.requested]
-    return [made for other, made in acting.items() if other != names and other in found]
+        neutral, made = before.signals[:, there], [runs.signals[:, there] for runs in after]
+        acting = [k for k, runs in enumerate(after) if len(runs)]
+        evidence = predictive_gains(one, neutral, [made[k] for k in acting])
+        for k, gained in zip(acting, evidence, strict=True):
+            new = gap(one, neutral, made[k], seed)._replace(evidence=float(gained))
+            found[k] = replace(found[k], gaps=(*found[k].gaps, new))
+        for k in set(range(len(found))) - set(acting):
+            # what cannot be simulated there is not borne out there
+            found[k] = replace(found[k], unpredicted=found[k].unpredicted or after[k].error)
+    return [replace(one, gaps=()) if one.unpredicted else one for one in found]
 
 
 def _check_others(name: str, given: Any, kind: type) -> None:

@@ -95,7 +95,8 @@ def _simulated(
 ) -> np.ndarray:
     """Runs [rivals, n, values] of those draws that can be simulated for each of the rivals."""
     thetas = [{name: of[draws] for name, of in one.theta.items()} for one in rivals.values()]
-    phase = "next experiment, again" if draws.start else "next experiment"
+    again = ", again" if draws.start else ""
+    phase = f"next {proposal.label}{again}"  # proposals may share a simulator's identity
     made = study.run_each(phase, thetas, proposal)
     common = set.intersection(*(set(runs.seeds.tolist()) for runs in made))
     rows = [[seed in common for seed in runs.seeds.tolist()] for runs in made]

@@ -20,6 +20,7 @@ from ..prior import Prior
 from ..types import Simulator
 from .measurement_noise import Noise, check_noise, samples
 from .model_errors import split_noise
+from .verdict_kind import NONE, OTHER
 
 
 class Window(NamedTuple):
@@ -181,5 +182,8 @@ def check_extensions(prior: Prior, extensions: object) -> None:
         raise ValueError(f"extensions must map names to an Extension, got {extensions!r:.100}")
     for name, extension in extensions.items():
         check_kind(f"extension {name!r}", extension, Extension)
-        if name in prior.names:
-            raise ValueError(f"extension {name!r} has the name of a parameter of the prior")
+        if name in (*prior.names, NONE, OTHER):
+            raise ValueError(
+                f"extension {name!r} has the name of a parameter of the prior, or of a verdict; "
+                "choose another name"
+            )

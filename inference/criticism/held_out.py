@@ -8,7 +8,7 @@ import numpy as np
 from .._float64 import in_float64
 from ..surrogates.output_vectors import MIN_LONG
 from .experiment import Experiment
-from .hypothesis import log_densities, sized_covariances
+from .hypothesis import error_sizes
 from .measurement_noise import Noise, gaussian, samples
 from .misfit import ACCEPTANCE_LEVEL, exceedance, judged_modes, orthonormal
 from .run_noise import errors_of, smooth_covariance
@@ -28,9 +28,11 @@ class Gap(NamedTuple):
         noise: RMS that measurement and the simulator's own noise would leave of a right model.
         model_error: RMS of the simulator's usual error besides.
         floor: RMS that these exceed once in a hundred times.
-        p_before, p_value: Of what is left before and after, by its RMS and by its slow part
-            (Bonferroni), all noise and the model error considered.
+        p_value: Of what is left after, by its RMS and by its slow part (Bonferroni), all noise
+            and the model error considered.
         lpd_gain: Log predictive density after less before.
+        evidence: The same under the covariance that all explanations share, by which they are
+            compared with one another.
     """
 
     label: str
@@ -39,20 +41,15 @@ class Gap(NamedTuple):
     noise: float
     model_error: float
     floor: float
-    p_before: float
     p_value: float
     lpd_gain: float
+    evidence: float
 
     @property
     def unexplained(self) -> tuple[float, float]:
         """Before and after, less the noise and the model error (in quadrature)."""
         known = float(np.hypot(self.noise, self.model_error))
         return excess_rms(self.before, known), excess_rms(self.after, known)
-
-    @property
-    def fits(self) -> bool:
-        """Whether noise and model error may be all that is left."""
-        return self.p_value > ACCEPTANCE_LEVEL / 2.0  # the fitted data are a test, too
 
 
 def excess_rms(rms: float, noise: float) -> float:
@@ -74,22 +71,17 @@ def holds(gaps: Sequence[Gap]) -> bool:
     before, after = np.sqrt(np.mean(np.square([one.unexplained for one in gaps]), axis=0))
     explained = after <= MAX_LEFT_SHARE * before or all(one.after <= one.floor for one in gaps)
     gained = sum(one.lpd_gain for one in gaps) > MIN_LPD_GAIN
-    return bool(all(one.fits for one in gaps) and explained and gained)
+    level = ACCEPTANCE_LEVEL / (1 + len(gaps))  # the fitted data are a test, too
+    fits = all(one.p_value > level for one in gaps)
+    return bool(fits and explained and gained)
 
 
 @in_float64
-def gap(
-    experiment: Experiment,
-    before: np.ndarray,
-    after: np.ndarray,
-    seed: int,
-    others: Sequence[np.ndarray] = (),
-) -> Gap:
+def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int) -> Gap:
     """Compare two models' predictions, [k, n] each.
 
     Both are judged under one covariance, so that neither wins by being vague: noise, and what
-    runs at posterior draws differ by, pooled. Densities, by which models are compared with one
-    another, are pooled over the `others`, too.
+    runs at posterior draws differ by, pooled.
     """
     observed = experiment.corrected[np.isfinite(experiment.observed)]
     fewer = 1.0 + 1.0 / min(len(before), len(after))  # the mean of few runs is noisy, too
@@ -104,15 +96,11 @@ def gap(
         slow = np.sum((span.T @ np.linalg.solve(factor, rows.T)) ** 2, axis=0)
         return np.stack([np.mean(rows**2, axis=1), slow])
 
-    usual = measures(null)
     means = np.stack([before.mean(0), after.mean(0)])
-    left = measures(observed - means)
-    p_values = [min(1.0, 2.0 * float(exceedance(usual, seen).min())) for seen in left.T]
-    pooled = judged(experiment.noise, experiment.observed, [before, after, *others], fewer)[0]
-    covariances, log_weight = sized_covariances(experiment.noise, at)
-    density = log_densities(observed - means, [pooled + one for one in covariances], log_weight)
+    left = measures(observed - means[1:])[:, 0]
     sizes = np.sqrt(np.mean((observed - means) ** 2, axis=1))
     known = np.trace(experiment.measurement.covariance(at) + simulated) / len(observed)
+    gain = float(predictive_gains(experiment, before, [after])[0])
     return Gap(
         label=experiment.label,
         before=float(sizes[0]),
@@ -120,10 +108,29 @@ def gap(
         noise=float(np.sqrt(known)),
         model_error=experiment.model_error_rms,
         floor=float(np.quantile(np.sqrt(np.mean(noise**2, axis=1)), NOISE_QUANTILE)),
-        p_before=p_values[0],
-        p_value=p_values[1],
-        lpd_gain=float(density[1] - density[0]),
+        p_value=min(1.0, 2.0 * float(exceedance(measures(null), left).min())),
+        lpd_gain=gain,
+        evidence=gain,
     )
+
+
+@in_float64
+def predictive_gains(
+    experiment: Experiment, before: np.ndarray, afters: Sequence[np.ndarray]
+) -> np.ndarray:
+    """Log predictive densities of models less that of another one, runs [k, n] each.
+
+    All have one covariance, so that they can be compared with one another.
+    """
+    groups = [before, *afters]
+    observed = experiment.corrected[np.isfinite(experiment.observed)]
+    at, series = samples(experiment.observed), len(observed) >= MIN_LONG
+    fewer = 1.0 + 1.0 / min(map(len, groups))
+    simulated = fewer * smooth_covariance(errors_of(groups), at, series)
+    rows = observed - np.stack([made.mean(0) for made in groups])
+    mean = experiment.noise.covariance(at) + simulated
+    density = error_sizes(experiment.noise, at).log_densities(rows, mean)
+    return density[1:] - density[0]
 
 
 def judged(

@@ -7,7 +7,7 @@ from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg import eigh, solve_triangular
 from scipy.special import logsumexp, ndtr
 
 from .._float64 import in_float64
@@ -28,6 +28,9 @@ from .runs import LATER_HALF_WIDTH, PriorBox, Runs
 
 COMPONENTS = 10
 SIZES = 12  # of the model error, that the likelihood is averaged over
+LEAST_SCALE = 1e-9  # of a variance whose model error is smaller than expected
+PRIOR_PRECISION = 12.0  # of a uniform quantile
+TINY_PRECISION = 1e-9
 SLOPE_STEP = 0.02  # of prior quantiles, for slopes
 PRIOR_END = 1e-4  # quantile of a prior from which a parameter is at its end
 INDEPENDENT_SLOPE = 1e-8  # relative size below which a slope adds nothing to those before
@@ -47,8 +50,7 @@ class Hypothesis:
         latent: Covariance of what the emulator does not know [m, m].
         own: Covariance of the simulator's own noise [m, m].
         noise: Covariance of the noise between the simulator and the data [m, m].
-        noises, log_weight: Covariances that this noise may have, for each size of the model error,
-            and their log weights.
+        error_sizes: Of the model error in it.
     """
 
     names: tuple[str, ...]
@@ -59,8 +61,7 @@ class Hypothesis:
     latent: np.ndarray
     own: np.ndarray
     noise: np.ndarray
-    noises: tuple[np.ndarray, ...]
-    log_weight: np.ndarray
+    error_sizes: "ErrorSizes"
 
     @property
     def surrogate(self) -> SignalSurrogate:
@@ -112,8 +113,8 @@ class Hypothesis:
     @in_float64
     def posterior_covariance(self) -> np.ndarray:
         """Of the parameters in prior quantiles, by Laplace's approximation [d, d]."""
-        # a uniform quantile has the variance 1/12
-        return np.linalg.inv(self.slopes.T @ self.slopes + 12.0 * np.eye(len(self.u)))
+        information = self.slopes.T @ self.slopes + PRIOR_PRECISION * np.eye(len(self.u))
+        return np.linalg.inv(information)
 
     @property
     def sd(self) -> np.ndarray:
@@ -146,17 +147,28 @@ class Hypothesis:
     def gain(self, base: "Hypothesis") -> float:
         """Log likelihood beyond a base model's, under the covariances of that."""
         rows = np.stack([self.difference, base.difference])
-        covariances = [base.spread + one for one in base.noises]
-        own, of_base = log_densities(rows, covariances, base.log_weight)
+        own, of_base = base.error_sizes.log_densities(rows, base.spread + base.noise)
         return float(own - of_base)
+
+    @cached_property
+    @in_float64
+    def coefficient_sds(self) -> np.ndarray:
+        """Sds of the coefficients in prior quantiles by the likelihood alone, each given those
+        before it [k]."""
+        first = len(self.u) - len(self.names)
+        alone = np.diag(np.linalg.cholesky(self.posterior_covariance[first:, first:]))
+        return np.maximum(alone**-2.0 - PRIOR_PRECISION, TINY_PRECISION) ** -0.5
 
     @property
     def occam(self) -> float:
-        """Log of the share of the coefficients' prior that explains the data as well as the best;
-        what the other parameters cost is the same without them."""
-        first = len(self.u) - len(self.names)
-        of_coefficients = self.posterior_covariance[first:, first:]
-        return 0.5 * float(np.linalg.slogdet(2.0 * np.pi * of_coefficients)[1])
+        """Log of the share of the coefficients' prior that explains the data as well as the best.
+
+        By Laplace's approximation within the prior. What the other parameters cost is nearly the
+        same without them.
+        """
+        sd, u = self.coefficient_sds, self.u[len(self.u) - len(self.names) :]
+        inside = ndtr((1.0 - u) / sd) - ndtr(-u / sd)
+        return float(np.sum(np.log(np.sqrt(2.0 * np.pi) * sd * inside)))
 
 
 @in_float64
@@ -195,8 +207,8 @@ def hypothesise(
     # now that it is known where it fits best, so is how noisy the simulator is there
     errors = resized(errors, prior.to_unit(theta)[fit.training_mask], near)
     u, own = _nearest(surrogate, errors, within)
-    sized, log_weight = sized_covariances(noise, samples(observed))
-    sized = [surrogate.output.average_covariance(one) for one in sized]
+    sizes = error_sizes(noise, samples(observed))
+    sizes = sizes._replace(part=surrogate.output.average_covariance(sizes.part))
     found = Hypothesis(
         names=names,
         fit=fit,
@@ -206,16 +218,15 @@ def hypothesise(
         latent=emulator.latent_covariance(u),
         own=own,
         noise=known,
-        noises=tuple(sized),
-        log_weight=log_weight,
+        error_sizes=sizes,
     )
     near_best = PriorBox.around(u, found.sd, LATER_HALF_WIDTH, most=np.inf)
-    reduced = _reduced(surrogate, [own + one for one in sized])
+    reduced = _reduced(surrogate, sizes.covariances(own + known))
     learned = replace(
         surrogate,
-        reduced=reduced._replace(log_weight=reduced.log_weight + log_weight),
-        nodes=Nodes(*(np.zeros(len(sized)) for part in Nodes._fields)),
-        log_prior=log_weight,
+        reduced=reduced._replace(log_weight=reduced.log_weight + sizes.log_weight),
+        nodes=Nodes(*(np.zeros(len(sizes.sizes)) for part in Nodes._fields)),
+        log_prior=sizes.log_weight,
         box=tuple(near_best.intersection(within)),
     )
     return replace(found, fit=replace(fit, learned=learned))
@@ -233,30 +244,42 @@ def _nearest(
     return minimise_in_box(partial(_squared_distance, likelihood), len(within.low), *within), own
 
 
-def sized_covariances(noise: Noise, at: Layout) -> tuple[list[np.ndarray], np.ndarray]:
-    """Covariances [n, n] that the noise of n samples may have, and their log weights.
+class ErrorSizes(NamedTuple):
+    """Sizes that the model error may have.
 
-    Few clean data tell how large the model error is; the residual of these data tells more.
+    Few clean data tell how large it is; the residual of these data tells more.
+
+    Attributes:
+        part: Its covariance [m, m] at size 1, part of the noise's; zero where there is no error.
+        sizes: Of its variance, in units of `part` [s].
+        log_weight: Of each size [s].
     """
-    mean, error = noise.covariance(at), split_noise(noise)[1]
+
+    part: np.ndarray
+    sizes: np.ndarray
+    log_weight: np.ndarray
+
+    def covariances(self, mean: np.ndarray) -> list[np.ndarray]:
+        """Of the noise [m, m] of each size, that of size 1 being `mean`."""
+        return [mean + (size - 1.0) * self.part for size in self.sizes]
+
+    @in_float64
+    def log_densities(self, rows: np.ndarray, mean: np.ndarray) -> np.ndarray:
+        """Log densities [n], up to a constant, of residuals [n, m] under these covariances."""
+        # the covariances of all sizes have the same generalised eigenvectors
+        share, vectors = eigh(self.part, mean)
+        scale = np.maximum(1.0 + np.outer(self.sizes - 1.0, share), LEAST_SCALE)
+        squares = (rows @ vectors) ** 2
+        each = -0.5 * (squares @ (1.0 / scale).T + np.log(scale).sum(1))
+        return np.asarray(logsumexp(each + self.log_weight, axis=1))
+
+
+def error_sizes(noise: Noise, at: Layout) -> ErrorSizes:
+    """Of the model error in the noise of m samples."""
+    error = split_noise(noise)[1]
     if error is None:
-        return [mean], np.zeros(1)
-    part = error.covariance(at)
-    sizes, log_weight = error.sizes(SIZES)
-    return [mean + (size - 1.0) * part for size in sizes], log_weight
-
-
-def log_densities(
-    rows: np.ndarray, covariances: Sequence[np.ndarray], log_weight: np.ndarray
-) -> np.ndarray:
-    """Log densities [n], up to a constant, of residuals [n, m] whose covariance is one of several
-    [m, m], of these log weights."""
-    each = []
-    for covariance in covariances:
-        factor = np.linalg.cholesky(covariance)
-        white = solve_triangular(factor, rows.T, lower=True)
-        each.append(-0.5 * np.sum(white**2, axis=0) - np.log(np.diag(factor)).sum())
-    return np.asarray(logsumexp(np.array(each) + log_weight[:, None], axis=0))
+        return ErrorSizes(np.zeros((len(at.sample),) * 2), np.ones(1), np.zeros(1))
+    return ErrorSizes(error.covariance(at), *error.sizes(SIZES))
 
 
 def _reduced(surrogate: SignalSurrogate, covariances: Sequence[np.ndarray]) -> Reduced:

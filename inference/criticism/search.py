@@ -13,11 +13,12 @@ from .hypothesis import Hypothesis
 from .misfit import Check, Signature, scored_on_clean, signature
 from .runs import FIRST_HALF_WIDTH, LATER_HALF_WIDTH, PriorBox, Runs, joined, sides
 from .study import MIN_EFFECT_RUNS, AllRunsFailed, Plan, Report, Study, silent
-from .verdict import FAR_BEHIND, TIE_MARGIN, Candidate, near_best
+from .verdict import FAR_BEHIND, Candidate, near_best
 
 BASE_PASSES = 6  # of runs of the base model, those after the first only until the fit is settled
 REFIT_PASSES = 4  # and of an explanation
 FULL_PASS = 8  # runs of a pass of refits, at least: fewer passes, and fuller calls
+SETTLED_GAIN = 4.0  # log likelihood by which a pass of runs may change a settled fit
 MAX_DOUBT = 1.0  # of a settled fit: emulator's variance over all variance, summed over the data
 SIDE_SHARES = (0.7, 0.35)  # of the prior quantiles from neutral to an end: where effects are tried
 LOOK = "look"  # phase of the first runs of effects where they seem to fit best
@@ -70,7 +71,7 @@ def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Prio
 def settled(gained: float, fitted: Hypothesis, box: PriorBox) -> bool:
     """Whether the runs in a box left a fit as good as it was, well known and inside of them."""
     doubt = np.trace(fitted.whiten(fitted.whiten(fitted.latent)))
-    return abs(gained) <= TIE_MARGIN and doubt <= MAX_DOUBT and box.encloses(fitted.u)
+    return abs(gained) <= SETTLED_GAIN and doubt <= MAX_DOUBT and box.encloses(fitted.u)
 
 
 def examine(study: Study, earlier: Runs | None) -> Base:
@@ -179,11 +180,16 @@ def own_residual(
     return OwnResidual(experiment.observed - runs[-1].signals.mean(0) - moved, fitted.best)
 
 
-def explain(study: Study, base: Base, accept: Sequence[str] | None = None) -> list[Candidate]:
+def explain(
+    study: Study, base: Base, accept: Sequence[str] | None = None
+) -> tuple[list[Candidate], Candidate | None]:
     """Fit every explanation by one effect, and pairs of effects where no single one suffices.
 
     Args:
         accept: Effects that are refitted together, whatever their rank.
+
+    Returns:
+        What was found, and the explanation by the effects to accept.
 
     Raises:
         AllRunsFailed: an effect to be accepted cannot be simulated.
@@ -203,9 +209,8 @@ def explain(study: Study, base: Base, accept: Sequence[str] | None = None) -> li
     search.refit(near_best(search.singles, plan.refits))
     if not any(one.accepted for one in search.singles):
         search.try_pairs()
-    if forced:
-        search.force(forced)
-    return list(search.found.values())
+    found = list(search.found.values())
+    return found, search.force(forced) if forced else None
 
 
 def unsought(base: Base) -> list[Candidate]:
@@ -235,14 +240,11 @@ class Search:
     def singles(self) -> list[Candidate]:
         return [one for one in self.found.values() if len(one.names) == 1]
 
-    def candidate(self, hypothesis: Hypothesis, known: Candidate | None = None) -> Candidate:
-        """The extended model, tested; it keeps what is known of the explanation besides."""
+    def candidate(self, hypothesis: Hypothesis, refitted: bool = False) -> Candidate:
+        """The extended model, tested."""
         tested, _ = self.study.check(hypothesis, self.base.signatures)
         gain = hypothesis.gain(self.base.hypothesis)
-        found = Candidate(hypothesis, tested, gain, hypothesis.occam)
-        if known is None:
-            return found
-        return replace(found, refitted=known.refitted, requested=known.requested)
+        return Candidate(hypothesis, tested, gain, hypothesis.occam, refitted)
 
     def visit(
         self, phase: str, candidates: Sequence[Candidate], count: int, narrowing: int = 0
@@ -272,7 +274,7 @@ class Search:
             if one.names in boxes:
                 within = one.hypothesis.within.hull(boxes[one.names])
                 fitted = study.hypothesis(one.names, self.runs, within)
-                self.found[one.names] = self.candidate(fitted, self.found[one.names])
+                self.found[one.names] = self.candidate(fitted, one.refitted)
         return boxes
 
     def refit(self, candidates: Sequence[Candidate]) -> None:
@@ -286,7 +288,7 @@ class Search:
             tried = sorted((self.found[names] for names in boxes), key=lambda one: -one.gain)
             accepted = [one.gain for one in self.found.values() if one.accepted]
             best = max((one.gain for one in tried), default=0.0)
-            due = max(accepted) - TIE_MARGIN if accepted else FAR_BEHIND * best
+            due = max(accepted) - SETTLED_GAIN if accepted else FAR_BEHIND * best
             candidates = []
             for one in tried:
                 gained = one.gain - before[one.names]
@@ -296,13 +298,14 @@ class Search:
             if not candidates:
                 break
 
-    def force(self, names: tuple[str, ...]) -> None:
+    def force(self, names: tuple[str, ...]) -> Candidate:
         """Refit the explanation by just these effects, whatever its rank."""
         known = (one for one in self.found.values() if set(one.names) == set(names))
         one = next(known, None) or self.together(names)
         if not one.refitted:
-            self.found[one.names], self.limited = replace(one, requested=True), False
+            self.found[one.names], self.limited = one, False
             self.refit([one])
+        return self.found[one.names]
 
     def together(self, names: tuple[str, ...]) -> Candidate:
         """Effects that were simulated one by one, as if together: wherever any of them was."""

@@ -4,12 +4,13 @@ Before the data, something is missing or not (`PRIOR`); each known effect is as 
 and so is each pair. The data change this by how probable they are under an explanation: its
 likelihood at the best parameters, times the share of the prior that is as good (Laplace's
 approximation; MacKay 2003, chapter 28), times the predictive density of held-out data. All
-explanations are wrong if something else is missing. Then the p-value of the best is small: it has
-the distribution Beta(`WRONG_P`, 1) of Sellke, Bayarri and Berger (2001), and is uniform under the
-right one.
+explanations are wrong if something else is missing. Then the p-value of the most probable one is
+small: it has the distribution Beta(`WRONG_P`, 1) of Sellke, Bayarri and Berger (2001), and is
+uniform if that one is right.
 
 A conclusion costs as much as the number of explanations that it leaves, and may miss the right one
-with the probability 1 - `CREDIBLE`: so it is the smallest set that holds it with that probability.
+with the probability 1 - `CREDIBLE`: the smallest set that holds it with the probability `CREDIBLE`
+costs least.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,16 +22,14 @@ import numpy as np
 from .held_out import Gap, holds
 from .hypothesis import Hypothesis
 from .misfit import ACCEPTANCE_LEVEL, REPLICATES, Check
-from .verdict_kind import CERTAIN, VerdictKind
+from .verdict_kind import CERTAIN, NONE, OTHER, VerdictKind
 
 REJECTION_LEVEL = 0.05  # p-value below which explanations are looked for
 MIN_GAIN = 2.0  # log likelihood below which an effect explains nothing
 FAR_BEHIND = 0.5  # of the best gain, below which one that does not pass is not worth more runs
-TIE_MARGIN = 4.0  # log likelihood by which one explanation must excel another
 CREDIBLE = 0.9  # probability that the right explanation is among those that are named
 WRONG_P = 0.01  # so that a p-value of 0.01 is as probable under a right and a wrong explanation
 P_VALUE_STEP = 3.0 / (REPLICATES + 1.0)  # the smallest of a test that looks at two statistics
-NONE, OTHER = "none", "none of these"
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,6 @@ class Candidate:
         occam: Log of the share of the coefficients' prior that explains the data as well.
         refitted: Whether runs near its best parameters were made for it; what was not is not
             accepted.
-        requested: Whether it was refitted only because the user accepts it: it changes no verdict.
         gaps: On the held-out data, where it was compared with them.
         unpredicted: Why it could not be simulated for held-out data; "" where it could.
     """
@@ -77,7 +75,6 @@ class Candidate:
     gain: float
     occam: float = 0.0
     refitted: bool = False
-    requested: bool = False
     gaps: tuple[Gap, ...] = ()
     unpredicted: str = ""
 
@@ -93,13 +90,13 @@ class Candidate:
     @property
     def seen(self) -> bool:
         """Whether held-out data, if there were any, show a gap that it could explain."""
-        return not self.gaps or any(gap.unexplained[0] > 0.0 for gap in self.gaps)
+        return not self.gaps or any(gap.before > gap.floor for gap in self.gaps)
 
     @property
     def evidence(self) -> float:
         """Log probability of all data beyond the base model's, that of the held-out data
         included."""
-        return self.gain + self.occam + sum(one.lpd_gain for one in self.gaps)
+        return self.gain + self.occam + sum(one.evidence for one in self.gaps)
 
     @property
     def passes(self) -> bool:
@@ -153,25 +150,25 @@ def probabilities(base: Check, candidates: Sequence[Candidate], effects: int) ->
         candidates: Explanations that were fitted.
         effects: Number of known effects, fitted or not.
     """
-    gaps = next((one.gaps for one in candidates if one.gaps), ())
     names = [NONE, *(label(one.names) for one in candidates)]
+    prior = [PRIOR.none, *(PRIOR.share(len(one.names), effects) for one in candidates)]
+    log_weight = np.log(prior) + [0.0, *(one.evidence for one in candidates)]
+    weight = np.exp(log_weight - log_weight.max())
+    best = int(np.argmax(weight))
+    tests = [base.p_value]
+    if best:
+        chosen = candidates[best - 1]
+        tests = [chosen.check.p_value, *(gap.p_value for gap in chosen.gaps)]
+    other = PRIOR.other / (1.0 - PRIOR.other) * weight.sum() / _fit_ratio(tests)
     untested = [one.unpredicted or (one.passes and not one.refitted) for one in candidates]
     tested = ~np.array([False, *map(bool, untested)])
-    prior = [PRIOR.none, *(PRIOR.share(len(one.names), effects) for one in candidates)]
-    evidence = [0.0, *(one.evidence for one in candidates)]
-    log_weight = np.log(prior) + evidence
-    weight = np.exp(log_weight - log_weight.max())
-    tests = [(base.p_value, *(gap.p_before for gap in gaps))]
-    tests += [(one.check.p_value, *(gap.p_value for gap in one.gaps)) for one in candidates]
-    joint = weight * [_fit_ratio(some) for some in tests]
-    other = PRIOR.other / (1.0 - PRIOR.other) * weight.sum() + joint[~tested].sum()
-    joint = np.append(joint * tested, other)
+    joint = np.append(weight * tested, other + weight[~tested].sum())
     return dict(zip([*names, OTHER], (joint / joint.sum()).tolist(), strict=True))
 
 
 def _fit_ratio(p_values: Sequence[float]) -> float:
-    """Probability of the smallest of several p-values if an explanation is right, over that if it
-    is wrong; both are of a whole step, since the bootstrap does not tell smaller ones apart."""
+    """Probability of the smallest of several p-values under a right explanation over that under a
+    wrong one, within the step of the bootstrap in which it lies."""
     step = P_VALUE_STEP * len(p_values)
     p = float(np.clip(len(p_values) * min(p_values), step, 1.0))
     return step / (p**WRONG_P - max(p - step, 0.0) ** WRONG_P)
@@ -191,18 +188,15 @@ def credible(probability: Mapping[str, float]) -> list[str]:
 
 
 def remaining(probability: Mapping[str, float], candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The explanations among the credible ones, best first; none where the model may lack nothing
-    or something else.
-
-    Where the held-out data show no gap they confirm nothing, and none is left alone.
-    """
+    """The credible explanations, best first; none where the model may lack nothing or something
+    else, where the best did not pass, and where one alone is left of which the held-out data show
+    nothing."""
+    by_label = {label(one.names): one for one in candidates}
     found = credible(probability)
-    accepted = [one for one in candidates if one.accepted]
-    if not accepted or NONE in found or OTHER in found:
+    if not set(found) <= by_label.keys() or not by_label[found[0]].accepted:
         return []
-    ranked = sorted(accepted, key=lambda one: -probability[label(one.names)])
-    count = max(len(found), 1 if ranked[0].seen else 2)
-    return ranked[:count] if len(ranked) >= count else []
+    members = [by_label[name] for name in found]
+    return members if len(members) > 1 or members[0].seen else []
 
 
 def conclude(
@@ -213,13 +207,13 @@ def conclude(
 ) -> Verdict:
     """From the base model's test and the probabilities of explanations."""
     p, members = base.p_value, remaining(probability, candidates)
-    if p >= level or NONE in credible(probability):
+    if p >= level or credible(probability)[0] == NONE:
         lacks_nothing = probability[NONE]
         reason = f"Model and data agree (p = {p:.2g}, {lacks_nothing:.0%} that nothing is missing)."
         return Verdict(VerdictKind.AGREEMENT, (), p, lacks_nothing, reason)
     differ = f"Model and data differ (p = {p:.2g}); "
     if not members:
-        reason = differ + _unexplained(candidates)
+        reason = differ + _unexplained(candidates, probability)
         return Verdict(VerdictKind.UNKNOWN, (), p, probability[OTHER], reason)
     reached = sum(probability[label(one.names)] for one in members)
     names = tuple(dict.fromkeys(name for member in members for name in member.names))
@@ -231,14 +225,14 @@ def conclude(
     return Verdict(VerdictKind.EFFECT, names, p, reached, differ + explains)
 
 
-def _unexplained(explanations: Sequence[Candidate]) -> str:
-    unseen = [label(one.names) for one in explanations if one.passes and not one.seen]
-    if unseen:
-        return f"{unseen[0]} may explain it, but held-out data show no gap that would confirm it."
+def _unexplained(explanations: Sequence[Candidate], probability: Mapping[str, float]) -> str:
+    best = credible(probability)[0]
     refuted = [label(one.names) for one in explanations if one.passes and not one.held]
-    if not refuted:
-        return "no known effect explains it."
-    return (
-        f"{' or '.join(refuted)} explains the fitted data but fails on held-out data. The missing "
-        "effect is unknown."
-    )
+    if refuted:
+        return (
+            f"{' or '.join(refuted)} explains the fitted data but fails on held-out data. The "
+            "missing effect is unknown."
+        )
+    if best == OTHER:
+        return f"no known effect explains it ({probability[OTHER]:.0%})."
+    return f"{best} may explain it ({probability[best]:.0%}), which these data do not confirm."

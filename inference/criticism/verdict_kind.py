@@ -1,8 +1,9 @@
-"""Kinds of verdict, and how sure one is that needs no "probably"."""
+"""Kinds of verdict, and the probability from which a name is not called probable."""
 
 from enum import StrEnum
 
 CERTAIN = 0.95  # probability, on held-out data
+NONE, OTHER = "none", "none of these"  # explanations without a known effect
 
 
 class VerdictKind(StrEnum):

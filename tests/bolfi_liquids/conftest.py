@@ -223,7 +223,7 @@ def _effects(status):
 def _held_out(holds):
     at = ("explanation", "recording")
     sizes = {"before": 0.03, "after": 0.01, "noise": 0.008, "floor": 0.012}
-    sizes |= {"p_before": 0.001, "p_value": 0.4, "lpd_gain": 33.3}
+    sizes |= {"p_value": 0.4, "lpd_gain": 33.3}
     columns = {key: (at, [[value]]) for key, value in sizes.items()}
     return xr.Dataset(
         {**columns, "holds": ("explanation", [holds])},

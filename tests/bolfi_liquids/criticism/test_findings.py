@@ -39,7 +39,7 @@ def source(accepted, extended):
     base = SimpleNamespace(hypothesis=model((), 0.0), signatures=())
     concluded = {"accepted": accepted, "extended": extended, "base": base}
     shown = {"gaps": {}, "suggestions": (), "probabilities": {}, "confusion": np.zeros((0, 0))}
-    return SimpleNamespace(**concluded, **shown)
+    return SimpleNamespace(**concluded, **shown, isolability=np.zeros((0, 0)))
 
 
 @pytest.fixture
@@ -160,7 +160,7 @@ def hypothesis(difference):
 def test_gaps_and_residuals_are_observed_less_expected():
     before, after = hypothesis([5.0, -5.0, 5.0, -5.0]), hypothesis([3.0, -3.0, 3.0, -3.0])
     sizes = {"before": 10.0, "after": 6.0, "noise": 3.0, "model_error": 4.0, "floor": 0.0}
-    gap = Gap("third", **sizes, p_before=0.0, p_value=1.0, lpd_gain=0.0)
+    gap = Gap("third", **sizes, p_value=1.0, lpd_gain=0.0, evidence=0.0)
     found = SimpleNamespace(
         leading=SimpleNamespace(hypothesis=after, names=after.names),
         base=SimpleNamespace(hypothesis=before),
