@@ -213,7 +213,7 @@ class Bolfi(Displayed):
         known = self._view, history.u[good], history.features[good], history.discrepancy[good]
         # runs that blew up did not succeed
         succeeded = history.succeeded & ~is_outlier(history.discrepancy)
-        return TrainingData(*known, self.prior.normal, RunOutcomes(history.u, succeeded))
+        return TrainingData(*known, self.prior.tails, RunOutcomes(history.u, succeeded))
 
     def tell(
         self,

@@ -65,5 +65,5 @@ def emulate(prior: Prior, theta: Theta, outputs: ArrayLike, scale: ArrayLike) ->
     due = f"hold {known.shape[1]} positive numbers, one per output"
     require(positive, "scale", due, weights)
     limits, u = EmulatorLimits(COMPONENTS, predicted=None), prior.to_unit(rows)[finite]
-    learned = vectors.emulate(u, known[finite], lambda _: weights, limits, None, prior.normal)
+    learned = vectors.emulate(u, known[finite], lambda _: weights, limits, None, prior.tails)
     return Emulation(prior, learned)

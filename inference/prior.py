@@ -13,6 +13,7 @@ from scipy.special import ndtri
 from ._float64 import in_float64
 from .arguments import checked_array, checked_integer, checked_mapping, is_table, require
 from .distributions import Univariate, describe
+from .gp.process import BOTH_TAILS, LOWER_TAIL, NO_TAIL, UPPER_TAIL
 from .types import Theta
 
 RESERVED = frozenset(
@@ -147,10 +148,10 @@ class Prior:
 
     @cached_property
     @in_float64
-    def normal(self) -> np.ndarray | None:
-        """Which parameters, or their logs, are rather normal than uniform, bool [d]; None for
-        none."""
-        found = np.array([_rather_normal(u) for u in self._univariate.values()])
+    def tails(self) -> np.ndarray | None:
+        """Ends at which each parameter, or its log, fades out like a normal one, int [d], see
+        `gp.process.coordinates`; None where none does."""
+        found = np.array([_tails(u) for u in self._univariate.values()])
         return found if found.any() else None
 
     def contains(self, theta: Theta) -> np.ndarray:
@@ -219,22 +220,36 @@ def _first_of(wrong: ArrayLike, theta: np.ndarray, names: tuple[str, ...]) -> st
     return f"{point} in row {at[0]}, the first of {at.size} such rows of {len(rows)}"
 
 
-def _rather_normal(univariate: Univariate) -> bool:
+def _tails(univariate: Univariate) -> int:
+    """The tails of the scores in which the parameter, or its log, is most nearly linear."""
     q = np.linspace(0.01, 0.99, 99)
     value = univariate.icdf(q)
-    forms = [value, np.log(value)] if value.min() > 0 else [value]
+    low = univariate.bounds[0]
+    # the log of what may be zero would stretch the smallest values to infinity
+    has_log = value.min() > 0.0 and (low > 0.0 or not _ends_abruptly(univariate, low))
+    forms = [value, np.log(value)] if has_log else [value]
+    scores = {
+        NO_TAIL: q,
+        BOTH_TAILS: ndtri(q),
+        UPPER_TAIL: ndtri(0.5 + 0.5 * q),
+        LOWER_TAIL: -ndtri(1.0 - 0.5 * q),
+    }
 
-    def linear(score: np.ndarray) -> float:
-        return max(np.corrcoef(form, score)[0, 1] for form in forms)
+    def linear(kind: int) -> float:
+        return max(np.corrcoef(form, scores[kind])[0, 1] for form in forms)
 
-    return bool(linear(ndtri(q)) > linear(q))
+    return max(scores, key=linear)
+
+
+def _ends_abruptly(univariate: Univariate, bound: float) -> bool:
+    return bool(np.isfinite(bound) and np.isfinite(univariate.log_prob(np.asarray(bound))))
 
 
 def _quantile(univariate: Univariate, u: np.ndarray) -> np.ndarray:
     inner = univariate.icdf(np.clip(u, TAIL_QUANTILE, 1.0 - TAIL_QUANTILE))
     value = np.clip(inner, *univariate.bounds)
     for bound, there in zip(univariate.bounds, (u <= 0.0, u >= 1.0), strict=True):
-        if np.isfinite(bound) and np.isfinite(univariate.log_prob(np.asarray(bound))):
+        if _ends_abruptly(univariate, bound):
             value = np.where(there, bound, value)
     return value
 

@@ -5,8 +5,9 @@ Its groups, under `stirs` and, where pours were given, under `pours`:
 - `residual`: over the data's own dimensions, `observed`, and with `_before` and `_after` the
   expectation of the base and of the extended model, and the sd of observed less expected;
 - `where`: over windows, their labels, and RMS, z and p-value before and after;
-- `effects`: over effects, what was found out about each; `unit` is that of `typical` and
-  `coefficient`, `side` the sign of the scores that count, 0 where both do;
+- `effects`: over effects, what was found out about each; `unit` is that of `typical`, `smallest`,
+  `limit` and `coefficient`, `side` the sign of the scores that count, 0 where both do;
+- `explanations`: over all of them, their probabilities;
 - `confusion`: cosines between the effects' signatures;
 - `held_out`: over explanations and recordings, the gap before and after;
 - `suggestions`: over further experiments, how well each would separate the explanations.
@@ -96,6 +97,10 @@ def _groups(
         "residual": _residual(source, dims, units).assign_coords(coords),
         "where": _where(source, units),
         "effects": _effects(source),
+        "explanations": Dataset(
+            {"probability": ("explanation", list(source.probabilities.values()))},
+            coords={"explanation": list(source.probabilities)},
+        ),
         "confusion": Dataset(cosine, coords={"effect": names, "other": names}),
     }
     if source.gaps:
@@ -182,6 +187,7 @@ def _effects(source: "inference.criticism.Criticism") -> "Dataset":
             "snr": signatures[name].snr,
             "score": source.base.check.scores.get(name, np.nan),
             "side": float(signatures[name].side),
+            **source.sensitivities[name]._asdict(),
         }
         candidate = singles.get(name)
         if candidate is None:
@@ -195,7 +201,8 @@ def _effects(source: "inference.criticism.Criticism") -> "Dataset":
         }
 
     rows = [of(name) for name in names]
-    numbers = ("typical", "snr", "score", "side", "gain", "p_value", "coefficient")
+    numbers = ("typical", "smallest", "limit", "snr", "score", "side", "gain", "p_value")
+    numbers += ("coefficient",)
     columns = {key: ("effect", [row.get(key, np.nan) for row in rows]) for key in numbers}
     status = ("effect", [str(row["status"]) for row in rows])
     units = ("effect", [source.units[name] for name in names])
@@ -230,9 +237,9 @@ def _held_out(source: "inference.criticism.Criticism", units: dict[str, str]) ->
         field: (
             ("explanation", "recording"),
             [[getattr(gap, field) for gap in row] for row in gaps],
-            DIMENSIONLESS if field in ("p_value", "lpd_gain") else units,
+            DIMENSIONLESS if field in ("p_before", "p_value", "lpd_gain") else units,
         )
-        for field in ("before", "after", "noise", "floor", "p_value", "lpd_gain")
+        for field in ("before", "after", "noise", "floor", "p_before", "p_value", "lpd_gain")
     }
     columns["holds"] = ("explanation", [source.holds(key) for key in source.gaps])
     labels = [gap.label for gap in gaps[0]]

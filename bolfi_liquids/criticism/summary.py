@@ -34,6 +34,10 @@ class SourceVerdict:
         verdict: The conclusion.
         effects: What it names: the effect, or those that are tied.
         p_value: Of the base model.
+        probability: That the verdict is right.
+        probabilities: Of "none", of each explanation and of "none of these".
+        limits: Effect -> distance of its coefficient from neutral that it does not exceed with 95 %
+            probability if it acts alone, in its unit; empty where something is missing.
         refuted: Explanations that held-out data contradict.
         held_out: Number of held-out data on which something was tried.
     """
@@ -41,6 +45,9 @@ class SourceVerdict:
     verdict: VerdictKind
     effects: tuple[str, ...]
     p_value: Number
+    probability: Number
+    probabilities: Mapping[str, Number]
+    limits: Mapping[str, Number]
     refuted: tuple[str, ...]
     held_out: int
 
@@ -48,10 +55,14 @@ class SourceVerdict:
     def of(cls, source: "inference.criticism.Criticism") -> Self:
         """From what the engine concluded."""
         verdict = source.verdict
+        agrees = verdict.kind is VerdictKind.AGREEMENT
         return cls(
             VerdictKind(verdict.kind),
             tuple(verdict.effects),
             verdict.p_value,
+            verdict.probability,
+            dict(source.probabilities),
+            {name: one.limit for name, one in source.sensitivities.items() if agrees},
             tuple(" with ".join(names) for names in source.refuted),
             max(map(len, source.gaps.values()), default=0),
         )
@@ -239,6 +250,7 @@ class CriticismSummary(Section):
         held_out: Number of held-out data on which something was tried.
         reason: For the verdict.
         p_value: Of the base model, corrected for the number of sources.
+        probability: That the verdict is right, on the source where it is least.
         where: Windows in which the base model and the stirs differ, most significant first.
         coefficient: Of each accepted effect.
         parameters: All those of the last model.
@@ -267,6 +279,7 @@ class CriticismSummary(Section):
     held_out: int
     reason: str
     p_value: Number
+    probability: Number
     where: tuple[DifferingWindow, ...]
     coefficient: Mapping[str, ParameterSummary]
     parameters: Mapping[str, ParameterSummary]
@@ -312,6 +325,7 @@ class CriticismSummary(Section):
             held_out=min(one.held_out for one in verdicts if one.verdict == verdict),
             reason=" ".join(source.verdict.reason for source in given),
             p_value=min(1.0, len(verdicts) * min(one.p_value for one in verdicts)),
+            probability=min(one.probability for one in verdicts if one.verdict == verdict),
             where=significant_windows(sources["stirs"]),
             coefficient={name: parameters[name] for name in accepted},
             parameters=parameters,

@@ -13,7 +13,7 @@ from ..calibration.result import Calibration
 from ..calibration.summary import CalibrationSummary, ParameterSummary, SamplerStatus, bad_fit
 from ..criticism.result import Criticism
 from ..criticism.summary import CriticismSummary, DifferingWindow, PourVerdict, SourceVerdict
-from ..inference.criticism.verdict_kind import VerdictKind
+from ..inference.criticism.verdict_kind import CERTAIN, VerdictKind
 from ..models.numerics import is_tested
 from ..pouring.pours import TENTH, Hold
 from ..pouring.result import ActionSummary, GivenPour, GivenSummary, Pour
@@ -223,6 +223,8 @@ def verdict_facts(summary: CriticismSummary) -> Facts:
     pours = summary.pours
     everything, stirs = _verdict("all", summary), _verdict("stirs", summary.stirs)
     poured = None if pours is None else _verdict("pours", pours)
+    if poured is None:  # these are all data
+        everything["limits"] = stirs["limits"]
     # an effect can take up any error that looks like it, also the simulator's own
     confirmed = summary.accepted and summary.held_out
     settled = summary.verdict is VerdictKind.AGREEMENT or confirmed
@@ -236,13 +238,17 @@ def verdict_facts(summary: CriticismSummary) -> Facts:
 
 def _verdict(data: str, found: CriticismSummary | SourceVerdict) -> Facts:
     """A conclusion on "all", "stirs" or "pours"."""
+    limits = found.limits if isinstance(found, SourceVerdict) else {}
     facts = {
         "data": data,
         "verdict": str(found.verdict),
         "p": f"{found.p_value:.2g}",
+        "probability": percent(found.probability),
         "effects": _spoken(found.effects),
         "confirmed": found.held_out > 0,
+        "certain": found.held_out > 0 and found.probability >= CERTAIN,
         "refuted": _spoken(found.refuted),
+        "limits": [f"{spoken(name)} {with_unit(name, at)}" for name, at in limits.items()],
     }
     if isinstance(found, PourVerdict):
         rms = {"before": found.before, "after": found.after}
@@ -296,6 +302,8 @@ def _effects(source: "DataTree") -> list[Facts]:
         {
             "name": spoken(one["effect"]),
             "typical": _number(one["typical"], ".3g", unit_of(one["effect"])),
+            "smallest": _number(one["smallest"], ".2g", unit_of(one["effect"])),
+            "limit": _number(one["limit"], ".2g", unit_of(one["effect"])),
             "snr": _number(one["snr"], ".1f"),
             "similar": _most_similar(one["effect"], source["confusion/cosine"]),
             "gain": _number(one["gain"], ".1f"),

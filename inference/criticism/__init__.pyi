@@ -22,6 +22,7 @@ from .model_errors import learned_model_error as learned_model_error
 from .model_errors import model_error as model_error
 from .model_errors import rhythm as rhythm
 from .of_fit import criticise_fit as criticise_fit
+from .power import Sensitivity as Sensitivity
 from .search import OwnResidual as OwnResidual
 from .search import own_residual as own_residual
 from .study import Plan as Plan

@@ -18,9 +18,19 @@ from .experiment import Experiment, Extensions, Proposal, check_extensions
 from .held_out import Gap, Suggestion, gap, holds, suggest
 from .hypothesis import Hypothesis, Interval, Weighted, weighted_posterior
 from .misfit import Found, confusion, locate, null_draws
-from .search import Base, examine, explain
+from .power import Sensitivity, sensitivity
+from .search import Base, examine, explain, unsought
 from .study import AllRunsFailed, Plan, Report, Study, silent
-from .verdict import REJECTION_LEVEL, Candidate, Verdict, VerdictKind, conclude, tied
+from .verdict import (
+    REJECTION_LEVEL,
+    Candidate,
+    Verdict,
+    VerdictKind,
+    conclude,
+    label,
+    probabilities,
+    remaining,
+)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -42,6 +52,10 @@ class Criticism(Displayed):
         experiment: The data, their noise and the simulator.
         units: Of the effects' coefficients.
         tied: Names of each explanation that remains, best first.
+        sensitivities: Of each effect that was simulated: which sizes the data would show, and which
+            they may hide.
+        probabilities: Of "none", of each explanation that was fitted, and of "none of these"; see
+            `verdict`.
         simulations: Runs that were asked for, those found in the bank included.
     """
 
@@ -58,6 +72,8 @@ class Criticism(Displayed):
     experiment: Experiment
     units: Mapping[str, str]
     tied: tuple[tuple[str, ...], ...]
+    probabilities: Mapping[str, float]
+    sensitivities: Mapping[str, Sensitivity]
     simulations: int
 
     def _shown(self) -> list[tuple[str, str]]:
@@ -113,6 +129,13 @@ class Criticism(Displayed):
         """The accepted explanation, or the best of those that are tied."""
         tied = self.tied[0] if self.verdict.kind is VerdictKind.TIE else None
         return _among(self.candidates, self.accepted) or _among(self.candidates, tied)
+
+    @property
+    def isolability(self) -> np.ndarray:
+        """Signal-to-noise ratio of each effect, of its typical size, that no size of the other
+        effect absorbs [e, e]; below about 3 the data do not tell the two apart."""
+        snr = np.array([of.snr for of in self.base.signatures.values()])
+        return snr[:, None] * np.sqrt(np.maximum(1.0 - self.confusion**2, 0.0))
 
     @property
     def confusion(self) -> np.ndarray:
@@ -204,12 +227,15 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     with open_compute(executor, timeout, batch, bank) as compute:
         study = Study(experiment, prior, extensions, compute, plan or Plan(), seed, counted)
         base = examine(study, None if earlier is None else study.table(*earlier))
-        candidates, members = [], []
+        candidates: list[Candidate] = []
         if accept is not None or base.check.p_value < level:
-            candidates, members = _explanations(study, base, accept, held_out)
-        verdict = conclude(base.check, members, level)
+            candidates = _explanations(study, base, accept, held_out)
+        sought = [one for one in candidates if not one.requested]
+        probability = probabilities(base.check, sought or unsought(base), len(extensions))
+        verdict = conclude(base.check, sought, probability, level)
+        members = remaining(probability, sought)
         rivals = _rivals(verdict, candidates, members)
-        best = {" with ".join(one.names): one.hypothesis.best for one in rivals}
+        best = {label(one.names): one.hypothesis.best for one in rivals}
         suggestions = suggest(study, proposals, best)
     named = verdict.effects if verdict.kind is VerdictKind.EFFECT else ()
     accepted = tuple(accept) if accept is not None else named
@@ -232,30 +258,29 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         untested=base.untested | _left_out(candidates),
         experiment=experiment,
         units={name: one.unit for name, one in extensions.items()},
-        tied=tuple(one.names for one in tied(members)),
+        tied=tuple(one.names for one in members),
+        probabilities=probability,
+        sensitivities={
+            name: sensitivity(base.hypothesis, single, extensions[name], len(extensions))
+            for name, single in base.singles.items()
+        },
         simulations=count,
     )
 
 
 def _explanations(
     study: Study, base: Base, accept: Sequence[str] | None, held_out: Sequence[Experiment]
-) -> tuple[list[Candidate], list[Candidate]]:
-    """Fit explanations, and test those that passed on the held-out data.
-
-    Returns:
-        All of them; and those that passed, but for what cannot be simulated for held-out data.
-    """
-    candidates, members = explain(study, base, accept)
-    passed = [one.names for one in members]
+) -> list[Candidate]:
+    """Fit explanations, and test those that passed on the held-out data."""
+    candidates = explain(study, base, accept)
     accepted = _among(candidates, accept)
-    chosen = [one for one in candidates if one.names in passed or one is accepted]
+    chosen = [one for one in candidates if one.accepted or one is accepted]
     gaps, failed = _gaps(study, base, chosen, held_out)
     # what cannot be simulated there is not borne out there
-    judged = [
+    return [
         replace(one, gaps=gaps.get(one.names, ()), unpredicted=failed.get(one.names, ""))
         for one in candidates
     ]
-    return judged, [one for one in judged if one.names in passed and not one.unpredicted]
 
 
 def _rivals(
@@ -263,7 +288,7 @@ def _rivals(
 ) -> list[Candidate]:
     """Explanations that a further experiment should tell apart."""
     if verdict.kind is VerdictKind.TIE:
-        return tied(members)
+        return list(members)
     if verdict.kind is VerdictKind.UNKNOWN:
         return sorted(candidates, key=lambda c: -c.gain)[:2]
     return []
@@ -306,15 +331,27 @@ def _gaps(
         for model, made in zip(models[1:], after, strict=True):
             if not len(made):
                 failed.setdefault(model.names, made.error)
-        gaps = {
-            model.names: (
-                *gaps[model.names],
-                gap(one, before.signals[:, there], made.signals[:, there], seed),
-            )
+        neutral = before.signals[:, there]
+        acting = {
+            model.names: made.signals[:, there]
             for model, made in zip(models[1:], after, strict=True)
             if model.names not in failed
         }
+        gaps = {
+            names: (*gaps[names], gap(one, neutral, made, seed, _rivals_of(names, chosen, acting)))
+            for names, made in acting.items()
+        }
     return gaps, failed
+
+
+def _rivals_of(
+    names: tuple[str, ...],
+    chosen: Sequence[Candidate],
+    acting: Mapping[tuple[str, ...], np.ndarray],
+) -> list[np.ndarray]:
+    """Runs of the explanations beside the named one that the search itself found."""
+    found = [one.names for one in chosen if not one.requested]
+    return [made for other, made in acting.items() if other != names and other in found]
 
 
 def _check_others(name: str, given: Any, kind: type) -> None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.special import ndtr
+from scipy.special import logsumexp, ndtr
 
 from .._float64 import in_float64
 from ..bolfi import Bolfi
@@ -47,6 +47,8 @@ class Hypothesis:
         latent: Covariance of what the emulator does not know [m, m].
         own: Covariance of the simulator's own noise [m, m].
         noise: Covariance of the noise between the simulator and the data [m, m].
+        noises, log_weight: Covariances that this noise may have, for each size of the model error,
+            and their log weights.
     """
 
     names: tuple[str, ...]
@@ -57,6 +59,8 @@ class Hypothesis:
     latent: np.ndarray
     own: np.ndarray
     noise: np.ndarray
+    noises: tuple[np.ndarray, ...]
+    log_weight: np.ndarray
 
     @property
     def surrogate(self) -> SignalSurrogate:
@@ -106,11 +110,15 @@ class Hypothesis:
 
     @cached_property
     @in_float64
-    def sd(self) -> np.ndarray:
-        """Sds of the parameters in prior quantiles, by Laplace's approximation [d]."""
+    def posterior_covariance(self) -> np.ndarray:
+        """Of the parameters in prior quantiles, by Laplace's approximation [d, d]."""
         # a uniform quantile has the variance 1/12
-        information = self.slopes.T @ self.slopes + 12.0 * np.eye(len(self.u))
-        return np.sqrt(np.diag(np.linalg.inv(information)))
+        return np.linalg.inv(self.slopes.T @ self.slopes + 12.0 * np.eye(len(self.u)))
+
+    @property
+    def sd(self) -> np.ndarray:
+        """Sds of the parameters in prior quantiles [d]."""
+        return np.sqrt(np.diag(self.posterior_covariance))
 
     @in_float64
     def whiten(self, rows: np.ndarray) -> np.ndarray:
@@ -133,6 +141,22 @@ class Hypothesis:
     def misfit(self, metric: "Hypothesis") -> float:
         """Squared length of the difference under another hypothesis's covariance."""
         return float(np.sum(metric.whiten(self.difference) ** 2))
+
+    @in_float64
+    def gain(self, base: "Hypothesis") -> float:
+        """Log likelihood beyond a base model's, under the covariances of that."""
+        rows = np.stack([self.difference, base.difference])
+        covariances = [base.spread + one for one in base.noises]
+        own, of_base = log_densities(rows, covariances, base.log_weight)
+        return float(own - of_base)
+
+    @property
+    def occam(self) -> float:
+        """Log of the share of the coefficients' prior that explains the data as well as the best;
+        what the other parameters cost is the same without them."""
+        first = len(self.u) - len(self.names)
+        of_coefficients = self.posterior_covariance[first:, first:]
+        return 0.5 * float(np.linalg.slogdet(2.0 * np.pi * of_coefficients)[1])
 
 
 @in_float64
@@ -171,6 +195,8 @@ def hypothesise(
     # now that it is known where it fits best, so is how noisy the simulator is there
     errors = resized(errors, prior.to_unit(theta)[fit.training_mask], near)
     u, own = _nearest(surrogate, errors, within)
+    sized, log_weight = sized_covariances(noise, samples(observed))
+    sized = [surrogate.output.average_covariance(one) for one in sized]
     found = Hypothesis(
         names=names,
         fit=fit,
@@ -180,9 +206,10 @@ def hypothesise(
         latent=emulator.latent_covariance(u),
         own=own,
         noise=known,
+        noises=tuple(sized),
+        log_weight=log_weight,
     )
     near_best = PriorBox.around(u, found.sd, LATER_HALF_WIDTH, most=np.inf)
-    sized, log_weight = _sized(noise, observed, surrogate)
     reduced = _reduced(surrogate, [own + one for one in sized])
     learned = replace(
         surrogate,
@@ -206,20 +233,30 @@ def _nearest(
     return minimise_in_box(partial(_squared_distance, likelihood), len(within.low), *within), own
 
 
-def _sized(
-    noise: Noise, observed: np.ndarray, surrogate: SignalSurrogate
-) -> tuple[list[np.ndarray], np.ndarray]:
-    """Covariances [m, m] that the noise may have, and their log weights.
+def sized_covariances(noise: Noise, at: Layout) -> tuple[list[np.ndarray], np.ndarray]:
+    """Covariances [n, n] that the noise of n samples may have, and their log weights.
 
     Few clean data tell how large the model error is; the residual of these data tells more.
     """
-    assert surrogate.known is not None
-    known, error = surrogate.known.covariance, split_noise(noise)[1]
+    mean, error = noise.covariance(at), split_noise(noise)[1]
     if error is None:
-        return [known], np.zeros(1)
-    part = surrogate.output.average_covariance(error.covariance(samples(observed)))
+        return [mean], np.zeros(1)
+    part = error.covariance(at)
     sizes, log_weight = error.sizes(SIZES)
-    return [known + (size - 1.0) * part for size in sizes], log_weight
+    return [mean + (size - 1.0) * part for size in sizes], log_weight
+
+
+def log_densities(
+    rows: np.ndarray, covariances: Sequence[np.ndarray], log_weight: np.ndarray
+) -> np.ndarray:
+    """Log densities [n], up to a constant, of residuals [n, m] whose covariance is one of several
+    [m, m], of these log weights."""
+    each = []
+    for covariance in covariances:
+        factor = np.linalg.cholesky(covariance)
+        white = solve_triangular(factor, rows.T, lower=True)
+        each.append(-0.5 * np.sum(white**2, axis=0) - np.log(np.diag(factor)).sum())
+    return logsumexp(np.array(each) + log_weight[:, None], axis=0)
 
 
 def _reduced(surrogate: SignalSurrogate, covariances: Sequence[np.ndarray]) -> Reduced:

@@ -207,30 +207,30 @@ def signature(base: Hypothesis, extended: Hypothesis, extension: Extension) -> S
         u = neutral + side * QUANTILE_STEPS
         u = u[(u >= 0.01) & (u <= 0.99)]
         if len(u):
-            changes = _changes(base, extended, neutral, u)
-            length = np.maximum(_visible(base, changes), 1e-12)
+            changes = changes_of(base, extended, neutral, u)
+            length = np.maximum(snr_of(base, changes), 1e-12)
             nearest = np.argmin(np.abs(np.log(length / VISIBLE_SNR)))
             units[side] = side * changes[nearest] / length[nearest]
     change = np.mean(list(units.values()), axis=0)
     middle = (neutral + float(neutral <= 0.5)) / 2.0
-    typical = _changes(base, extended, neutral, np.array([middle]))
+    typical = changes_of(base, extended, neutral, np.array([middle]))
     return Signature(
         change,
-        float(_visible(base, change[None])[0]),
+        float(snr_of(base, change[None])[0]),
         float(prior.from_unit(np.append(base.u, middle))[name]),
-        float(_visible(base, typical)[0]),
+        float(snr_of(base, typical)[0]),
         side=sum(units),  # of both sides, 0
     )
 
 
-def _changes(base: Hypothesis, extended: Hypothesis, neutral: float, u: np.ndarray) -> np.ndarray:
+def changes_of(base: Hypothesis, extended: Hypothesis, neutral: float, u: np.ndarray) -> np.ndarray:
     """Changes of the expected values [n, m] due to coefficients at prior quantiles u [n]."""
     points = np.column_stack([np.tile(base.u, (len(u) + 1, 1)), np.append(neutral, u)])
     expected = extended.expected(points)
     return expected[1:] - expected[0]
 
 
-def _visible(base: Hypothesis, changes: np.ndarray) -> np.ndarray:
+def snr_of(base: Hypothesis, changes: np.ndarray) -> np.ndarray:
     """Signal-to-noise ratios of changes [n, m] that the base parameters do not absorb [n]."""
     return np.linalg.norm(base.visible(changes), axis=0)
 

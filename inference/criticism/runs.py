@@ -12,7 +12,7 @@ from .experiment import Extension
 
 MIN_POSTERIOR_SDS = 10.0  # posterior sds: narrower boxes make slopes of noise (errors in variables)
 FIRST_HALF_WIDTH = 0.25  # half a box's width to begin with
-LATER_HALF_WIDTH = 0.08  # later
+LATER_HALF_WIDTH = 0.08  # later; half as much in each further pass, down to what the sds allow
 MAX_HALF_WIDTH = 0.5  # at most
 WALL_SHARE = 0.02  # of a box's width, within which a point lies at its wall
 PRIOR_END = 0.02  # quantiles from an end of a prior to neutral, within which it is one-sided

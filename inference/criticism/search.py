@@ -21,7 +21,6 @@ FULL_PASS = 8  # runs of a pass of refits, at least: fewer passes, and fuller ca
 MAX_DOUBT = 1.0  # of a settled fit: emulator's variance over all variance, summed over the data
 SIDE_SHARES = (0.7, 0.35)  # of the prior quantiles from neutral to an end: where effects are tried
 LOOK = "look"  # phase of the first runs of effects where they seem to fit best
-SECOND_EFFECT_GAIN = 6.0  # log likelihood that a second effect must gain
 CLEAN_PASSES = 2  # of runs where the model fits clean data best: so far, and with the first's runs
 CLEAN_RUNS = 2  # of each; the mean of the last is free of the emulator's error
 
@@ -64,7 +63,7 @@ def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Prio
         before, fitted = fitted, study.hypothesis((), runs, whole)
         if settled(0.5 * (before.misfit(fitted) - fitted.misfit(fitted)), fitted, box):
             break
-        box = PriorBox.around(fitted.u, fitted.sd, LATER_HALF_WIDTH)
+        box = PriorBox.around(fitted.u, fitted.sd, LATER_HALF_WIDTH / 2**attempt)
     return fitted, runs, first
 
 
@@ -180,16 +179,11 @@ def own_residual(
     return OwnResidual(experiment.observed - runs[-1].signals.mean(0) - moved, fitted.best)
 
 
-def explain(
-    study: Study, base: Base, accept: Sequence[str] | None = None
-) -> tuple[list[Candidate], list[Candidate]]:
+def explain(study: Study, base: Base, accept: Sequence[str] | None = None) -> list[Candidate]:
     """Fit every explanation by one effect, and pairs of effects where no single one suffices.
 
     Args:
         accept: Effects that are refitted together, whatever their rank.
-
-    Returns:
-        All explanations, and the accepted ones.
 
     Raises:
         AllRunsFailed: an effect to be accepted cannot be simulated.
@@ -209,10 +203,22 @@ def explain(
     search.refit(near_best(search.singles, plan.refits))
     if not any(one.accepted for one in search.singles):
         search.try_pairs()
-    accepted = [one for one in search.found.values() if one.accepted]  # whatever is forced
     if forced:
         search.force(forced)
-    return list(search.found.values()), [one for one in accepted if len(one.names) == 1] or accepted
+    return list(search.found.values())
+
+
+def unsought(base: Base) -> list[Candidate]:
+    """Explanations by one effect where none was looked for; first fits tell less than scores."""
+
+    def gain(name: str) -> float:
+        score, side = base.check.scores.get(name, 0.0), base.signatures[name].side
+        return 0.5 * (max(side * score, 0.0) if side else score) ** 2
+
+    return [
+        Candidate(one, base.check, gain(name), one.occam, refitted=True)
+        for name, one in base.singles.items()
+    ]
 
 
 class Search:
@@ -229,15 +235,17 @@ class Search:
     def singles(self) -> list[Candidate]:
         return [one for one in self.found.values() if len(one.names) == 1]
 
-    def candidate(self, hypothesis: Hypothesis, refitted: bool = False) -> Candidate:
-        """The extended model, tested."""
-        metric = self.base.hypothesis
-        gain = 0.5 * (metric.misfit(metric) - hypothesis.misfit(metric))
+    def candidate(self, hypothesis: Hypothesis, known: Candidate | None = None) -> Candidate:
+        """The extended model, tested; it keeps what is known of the explanation besides."""
         tested, _ = self.study.check(hypothesis, self.base.signatures)
-        return Candidate(hypothesis, tested, gain, refitted)
+        gain = hypothesis.gain(self.base.hypothesis)
+        found = Candidate(hypothesis, tested, gain, hypothesis.occam)
+        if known is None:
+            return found
+        return replace(found, refitted=known.refitted, requested=known.requested)
 
     def visit(
-        self, phase: str, candidates: Sequence[Candidate], count: int
+        self, phase: str, candidates: Sequence[Candidate], count: int, narrowing: int = 0
     ) -> dict[tuple[str, ...], PriorBox]:
         """Simulate each of them near its optimum, all in one call, and fit it again.
 
@@ -251,7 +259,7 @@ class Search:
             # what is best at the end of what was simulated is looked for well beyond
             near = one.refitted or phase != LOOK
             near = near and fitted.within.encloses(fitted.u)
-            least = LATER_HALF_WIDTH if near else FIRST_HALF_WIDTH
+            least = LATER_HALF_WIDTH / 2**narrowing if near else FIRST_HALF_WIDTH
             boxes[one.names] = PriorBox.around(fitted.u, fitted.sd, least)
         left = study.plan.most - (len(self.runs) - self.counted)
         if self.limited:
@@ -264,7 +272,7 @@ class Search:
             if one.names in boxes:
                 within = one.hypothesis.within.hull(boxes[one.names])
                 fitted = study.hypothesis(one.names, self.runs, within)
-                self.found[one.names] = self.candidate(fitted, one.refitted)
+                self.found[one.names] = self.candidate(fitted, self.found[one.names])
         return boxes
 
     def refit(self, candidates: Sequence[Candidate]) -> None:
@@ -272,7 +280,7 @@ class Search:
         for attempt in range(REFIT_PASSES):
             before = {one.names: one.gain for one in candidates}
             count = max(self.study.plan.refit, FULL_PASS // max(len(candidates), 1))
-            boxes = self.visit(f"refit {attempt}", candidates, count)
+            boxes = self.visit(f"refit {attempt}", candidates, count, attempt)
             for names in boxes:
                 self.found[names] = replace(self.found[names], refitted=True)
             tried = sorted((self.found[names] for names in boxes), key=lambda one: -one.gain)
@@ -293,7 +301,7 @@ class Search:
         known = (one for one in self.found.values() if set(one.names) == set(names))
         one = next(known, None) or self.together(names)
         if not one.refitted:
-            self.found[one.names], self.limited = one, False
+            self.found[one.names], self.limited = replace(one, requested=True), False
             self.refit([one])
 
     def together(self, names: tuple[str, ...]) -> Candidate:
@@ -305,8 +313,8 @@ class Search:
         return self.candidate(self.study.hypothesis(names, self.runs, box.extended(len(names))))
 
     def try_pairs(self) -> None:
-        """Fit the best effect with those that its residual seems to need most; a pair counts if
-        it gains more than either alone. Single effects of an accepted pair are refitted."""
+        """Fit the best effect with those that its residual seems to need most. Single effects of an
+        accepted pair are refitted."""
         if not self.found:  # no effect could be simulated
             return
         self.counted = len(self.runs)
@@ -326,7 +334,3 @@ class Search:
         named = dict.fromkeys(name for one in tried if one.accepted for name in one.names)
         alone = [self.found[(name,)] for name in named]
         self.refit([one for one in alone if not one.refitted])
-        for one in tried:
-            best_alone = max(self.found[(name,)].gain for name in one.names)
-            needed = one.gain > best_alone + SECOND_EFFECT_GAIN
-            self.found[one.names] = replace(one, needed=needed)

@@ -1,6 +1,8 @@
-"""Kinds of verdict."""
+"""Kinds of verdict, and how sure one is that needs no "probably"."""
 
 from enum import StrEnum
+
+CERTAIN = 0.95  # probability, on held-out data
 
 
 class VerdictKind(StrEnum):

@@ -50,7 +50,7 @@ def log_marginal_likelihood(hyper: Hyper, data: Data) -> tuple[np.ndarray, np.nd
     Rasmussen and Williams (2006), eqs. 2.30 and 5.9; NaN where a Gram matrix is not positive
     definite. What is found of a process depends on no other, to the last bit.
     """
-    at = coordinates(data.u, data.normal)
+    at = coordinates(data.u, data.tails)
     squared = ((at[:, None, :] - at) ** 2).reshape(-1, at.shape[1])
     together = max(1, CACHED_NUMBERS // len(squared))
     parts = [

@@ -18,6 +18,8 @@ RELEVANT_LENGTH = 0.5  # length scale from which on a parameter's trend fades
 JITTER = 1e-7
 """Variance added to every target, in units of the targets': below it rounding would rule."""
 SCORE_EDGE = 1e-9  # quantile beyond which normal scores end
+NO_TAIL, BOTH_TAILS, UPPER_TAIL, LOWER_TAIL = range(4)
+HALF_NORMAL_MEAN, HALF_NORMAL_SD = (2.0 / np.pi) ** 0.5, (1.0 - 2.0 / np.pi) ** 0.5
 MIN_VARIANCE = 1e-10  # latent variance, which rounding may make negative
 MIN_ROWS = 32  # of padded processes
 BATCH = 256  # points of one product, which fits a processor's cache
@@ -27,7 +29,7 @@ POTRF, TRTRI = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
 class Data(NamedTuple):
     u: np.ndarray  # [n, d]
     y: np.ndarray  # [k, n], standardised
-    normal: np.ndarray | None = None  # bool [d], see `coordinates`; None for none
+    tails: np.ndarray | None = None  # int [d], see `coordinates`; None for none
     spread: np.ndarray | None = None  # [n], by which the noise's variance is multiplied; None is 1
 
     def noise(self, log_noise: Any) -> np.ndarray:
@@ -57,18 +59,25 @@ class GP(NamedTuple):
         return GP(hyper, data, self.whitener[chosen], self.weights[chosen])
 
 
-def coordinates(u: Any, normal: np.ndarray | None) -> Any:
-    """Prior quantiles u [..., d] as the kernel sees them: normal scores where `normal` [d].
+def coordinates(u: Any, tails: np.ndarray | None) -> Any:
+    """Prior quantiles u [..., d] as the kernel sees them: scores where a prior has `tails` [d].
 
-    A prior that fades out crowds its tails into the edges of the box: what is smooth in the
-    parameter is steep in its quantile there, and no stationary kernel follows. Scores are
-    scaled to the quantiles' mean and sd, so that one prior of the length scales serves both.
+    A prior that fades out crowds its tail into an end of the box: what is smooth in the
+    parameter is steep in its quantile there, and no stationary kernel follows. A prior with two
+    tails is seen as normal scores, one with a single tail as scores of half a normal: at its other
+    end, where it ends abruptly, a normal score would put its most probable values far out.
+    Scores are scaled to the quantiles' mean and sd, so that one prior of the length scales serves
+    all.
     """
-    if normal is None:
+    if tails is None:
         return u
     xp = namespace(u)
-    clipped = xp.clip(u, SCORE_EDGE, 1.0 - SCORE_EDGE)
-    return xp.where(normal, 0.5 + ndtri(clipped) / 12.0**0.5, u)
+    half = xp.where(tails == LOWER_TAIL, 1.0 - u, u)
+    folded = xp.where(tails == BOTH_TAILS, u, 0.5 + 0.5 * half)
+    score = ndtri(xp.clip(folded, SCORE_EDGE, 1.0 - SCORE_EDGE))
+    halved = (score - HALF_NORMAL_MEAN) / HALF_NORMAL_SD
+    standard = xp.where(tails == BOTH_TAILS, score, xp.where(tails == LOWER_TAIL, -halved, halved))
+    return xp.where(tails == NO_TAIL, u, 0.5 + standard / 12.0**0.5)
 
 
 def covariance(hyper: Hyper, a: Any, b: Any) -> Any:
@@ -116,7 +125,7 @@ def inverse_cholesky(matrix: np.ndarray) -> np.ndarray:
 
 def condition(hyper: Hyper, data: Data) -> GP:
     """The processes given the data. Explicit inverse factors make prediction a product."""
-    at = coordinates(data.u, data.normal)
+    at = coordinates(data.u, data.tails)
     gram = covariance(hyper, at, at)
     noise = data.noise(hyper.log_noise) + JITTER
     whitener = np.stack(
@@ -139,7 +148,7 @@ def fantasize(gp: GP, u: np.ndarray, spread: np.ndarray | None = None) -> GP:
     if data.spread is not None:
         new = np.full(len(u), np.median(data.spread)) if spread is None else spread
         spread = np.concatenate([data.spread, new])
-    return condition(gp.hyper, Data(np.concatenate([data.u, u]), y, data.normal, spread))
+    return condition(gp.hyper, Data(np.concatenate([data.u, u]), y, data.tails, spread))
 
 
 def padded(gp: GP, processes: int | None = None) -> GP:
@@ -160,7 +169,7 @@ def _cross(gp: GP, u: Any) -> tuple[Any, Any]:
     """Covariance [k, m, n] of the latent functions at u [m, d] and at the data; the variance
     [k, m] at u alone."""
     xp = namespace(u)
-    at, there = (coordinates(points, gp.data.normal) for points in (u, gp.data.u))
+    at, there = (coordinates(points, gp.data.tails) for points in (u, gp.data.u))
     trends = TREND_SD**2 * xp.sum(trend(gp.hyper, at) ** 2, axis=-1)
     return covariance(gp.hyper, at, there), xp.exp(2.0 * gp.hyper.log_amplitude)[:, None] + trends
 
@@ -195,7 +204,7 @@ def _whitened(gp: GP, cross: Any) -> Any:
 def predict_joint(gp: GP, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Posterior covariance [k, m, q] of the latent functions between u [m, d] and v [q, d]."""
     at_u, at_v = _whitened(gp, _cross(gp, u)[0]), _whitened(gp, _cross(gp, v)[0])
-    at, there = (coordinates(points, gp.data.normal) for points in (u, v))
+    at, there = (coordinates(points, gp.data.tails) for points in (u, v))
     return covariance(gp.hyper, at, there) - at_u @ at_v.mT
 
 

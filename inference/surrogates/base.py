@@ -32,7 +32,7 @@ class TrainingData(NamedTuple):
     u: np.ndarray  # [n, d], prior quantiles
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n]
-    normal: np.ndarray | None  # bool [d], see `Prior.normal`
+    tails: np.ndarray | None  # int [d], see `Prior.tails`
     runs: RunOutcomes  # all, failed ones too
 
 

@@ -152,7 +152,7 @@ def learn(
     discrepancy: np.ndarray,
     transform: str | None = None,
     previous: DiscrepancySurrogate | None = None,
-    normal: np.ndarray | None = None,
+    tails: np.ndarray | None = None,
     rule: Threshold = None,
 ) -> DiscrepancySurrogate:
     """Fit the surrogate.
@@ -168,7 +168,7 @@ def learn(
         transform: A name, or None to choose.
         previous: Learned from the first of these data; its hyperparameters are kept until the
             data have grown by GROWTH, its transform until they have by TRANSFORM_GROWTH.
-        normal: Which parameters the kernel sees as normal scores [d], see `gp.process.coordinates`.
+        tails: Ends at which the parameters fade out [d], see `gp.process.coordinates`.
         rule: See `with_threshold`.
 
     Raises:
@@ -180,14 +180,14 @@ def learn(
         fits = previous is not None and np.isfinite(previous.scale(values)).all()
     grown = previous is None or n >= TRANSFORM_GROWTH * previous.chosen_at
     if previous is not None and fits and not (grown or previous.equal):
-        data = Data(u, previous.scale(values)[None], normal)
+        data = Data(u, previous.scale(values)[None], tails)
         hyper, learned_at = previous.gp.hyper, previous.learned_at
         if n >= GROWTH * learned_at:
             hyper, learned_at = maximum_a_posteriori(data, hyper), n
         learned = replace(previous, gp=condition(hyper, data), values=values, learned_at=learned_at)
         return with_threshold(learned, rule)
     options = [_standardise(option, values) for option in candidates(transform, values)]
-    every = [Data(u, scale(values)[None], normal) for scale in options]
+    every = [Data(u, scale(values)[None], tails) for scale in options]
     fitted = [condition(maximum_a_posteriori(data), data) for data in every]
     scores = [_score(gp, scale, values) for gp, scale in zip(fitted, options, strict=True)]
     best = int(np.argmax(scores))
@@ -311,8 +311,8 @@ class DiscrepancyFamily(Family):
     def _learn(
         self, data: TrainingData, previous: DiscrepancySurrogate | None, rule: Threshold
     ) -> DiscrepancySurrogate:
-        learned = learn(data.u, data.discrepancy, self.transform, previous, data.normal, rule)
-        return replace(learned, success=learn_success(data.runs, data.normal))
+        learned = learn(data.u, data.discrepancy, self.transform, previous, data.tails, rule)
+        return replace(learned, success=learn_success(data.runs, data.tails))
 
     def _rule(self, data: TrainingData, number: Callable[[np.ndarray], float]) -> Threshold:
         """The threshold that was given, or the one that fits the residual of the closest run."""

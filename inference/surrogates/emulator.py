@@ -318,7 +318,7 @@ def emulate(
     units: Units,
     limits: EmulatorLimits,
     previous: Emulator | None = None,
-    normal: np.ndarray | None = None,
+    tails: np.ndarray | None = None,
 ) -> Emulator:
     """Learn outputs [n, m] at u [n, d].
 
@@ -327,13 +327,13 @@ def emulate(
         limits: Of components and data.
         previous: Learned from the first of these data; its components and hyperparameters are
             kept until the data have grown by GROWTH.
-        normal: Which parameters the kernels see as normal scores [d], see `gp.process.coordinates`.
+        tails: Ends at which the parameters fade out [d], see `gp.process.coordinates`.
     """
     if previous is None or not previous.goes_on(outputs):
-        return _learned(Data(u, outputs.T, normal), units, limits)
+        return _learned(Data(u, outputs.T, tails), units, limits)
     spread = run_spread(previous.size, u)
     targets = _targets(previous.basis, outputs, previous.learned_at, previous.excess)
-    gp = condition(previous.gp.hyper, Data(u, targets, normal, spread))
+    gp = condition(previous.gp.hyper, Data(u, targets, tails, spread))
     kept = previous._replace(outputs=outputs)
     return _with_noise(kept, gp, _left(previous.basis, outputs, spread))
 
@@ -469,10 +469,10 @@ def resized(emulator: Emulator, units: Units) -> Emulator:
         return emulator
     data = emulator.gp.data
     for _ in range(SIZE_ROUNDS):
-        size = learn_size(_log_sizes(found), data.u, data.normal)
+        size = learn_size(_log_sizes(found), data.u, data.tails)
         if size is None:
             break
-        found = _learned(Data(data.u, found.outputs.T, data.normal), units, found.limits, size)
+        found = _learned(Data(data.u, found.outputs.T, data.tails), units, found.limits, size)
     return found
 
 
@@ -488,7 +488,7 @@ def _log_sizes(emulator: Emulator) -> np.ndarray:
     return 0.5 * np.log(spread * (found / due + LEAST_OF_ERROR))
 
 
-def learn_size(log_sizes: np.ndarray, u: np.ndarray, normal: np.ndarray | None) -> Size | None:
+def learn_size(log_sizes: np.ndarray, u: np.ndarray, tails: np.ndarray | None) -> Size | None:
     """The size as a smooth function of the parameters; None where a constant predicts as well.
 
     What predicts a run's size must do so where the run is left out. A process of fixed
@@ -497,12 +497,12 @@ def learn_size(log_sizes: np.ndarray, u: np.ndarray, normal: np.ndarray | None) 
     Args:
         log_sizes: Of the noise of each run [n], with an error of their own.
         u: Prior quantiles [n, d].
-        normal: As of `Data`.
+        tails: As of `Data`.
     """
     centre, sd = log_sizes.mean(), log_sizes.std()
     if not sd > 0.0:
         return None
-    data = Data(u, ((log_sizes - centre) / sd)[None], normal)
+    data = Data(u, ((log_sizes - centre) / sd)[None], tails)
     length, amplitude, noise = FIXED
     fixed = Hyper(np.full((1, u.shape[1]), length), np.array([amplitude]), np.array([noise]))
     if _gain(condition(fixed, data)) < NEEDED_NATS:

@@ -218,7 +218,7 @@ def _targets(data: TrainingData, scale: LogLikelihoodScale) -> Data:
     if usual > 0.0:
         share = np.maximum(np.where(np.isfinite(sd), sd / usual, 1.0), MIN_SD_SHARE)
         noise = (share / scale.folds(values)) ** 2
-    return Data(data.u, scale.targets(values)[None], data.normal, noise)
+    return Data(data.u, scale.targets(values)[None], data.tails, noise)
 
 
 @dataclass(frozen=True)
@@ -275,7 +275,7 @@ class LogLikelihoodFamily(Family):
                 targets = _targets(data, scale)
                 fitted.append((condition(maximum_a_posteriori(targets), targets), scale))
             gp, scale = max(fitted, key=lambda one: _score(one[0], one[1], values))
-        success = learn_success(data.runs, data.normal)
+        success = learn_success(data.runs, data.tails)
         return LogLikelihoodSurrogate(gp, values, n, scale, success=success)
 
     def learn(self, data: TrainingData, key: np.ndarray) -> LogLikelihoodSurrogate:

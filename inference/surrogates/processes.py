@@ -104,7 +104,7 @@ class _Laplace(NamedTuple):
     variances: np.ndarray  # [p] of their noise
 
 
-def learn_success(runs: RunOutcomes, normal: np.ndarray | None) -> GP | None:
+def learn_success(runs: RunOutcomes, tails: np.ndarray | None) -> GP | None:
     """A process whose normal integral is the probability of success; None if no run failed.
 
     Probit classification by Laplace's approximation (Rasmussen and Williams 2006, section 3.4),
@@ -113,7 +113,7 @@ def learn_success(runs: RunOutcomes, normal: np.ndarray | None) -> GP | None:
     """
     if runs.succeeded.all():
         return None
-    at, labels = coordinates(runs.u, normal), np.where(runs.succeeded, 1.0, -1.0)
+    at, labels = coordinates(runs.u, tails), np.where(runs.succeeded, 1.0, -1.0)
     found = []
     for length, amplitude in product(LENGTHS, AMPLITUDES):
         logs = np.log([length]), np.log([amplitude])
@@ -122,7 +122,7 @@ def learn_success(runs: RunOutcomes, normal: np.ndarray | None) -> GP | None:
         log_prior = -0.5 * ((logs[0][0] - LENGTH[0]) / LENGTH[1]) ** 2
         found.append((near.log_evidence + log_prior, hyper, near))
     _, hyper, near = max(found, key=lambda one: one[0])
-    return condition(hyper, Data(runs.u, near.targets[None], normal, near.variances))
+    return condition(hyper, Data(runs.u, near.targets[None], tails, near.variances))
 
 
 def _laplace(gram: np.ndarray, labels: np.ndarray) -> _Laplace:

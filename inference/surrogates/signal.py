@@ -467,10 +467,10 @@ class SignalFamily(Family):
         features, units = scale.of(data.features), scale.unit(output)
         limits = EmulatorLimits(self.components, self.predicted, scale.left)
         old = None if previous is None else previous.emulator
-        emulator = emulate(data.u, features, units, limits, old, data.normal)
+        emulator = emulate(data.u, features, units, limits, old, data.tails)
         if old is None and self.varying_noise:
             emulator = resized(emulator, units)
-        success = learn_success(data.runs, data.normal)
+        success = learn_success(data.runs, data.tails)
 
         def compared(at: np.ndarray | None) -> SignalSurrogate:
             """With what was observed, its noise being right around the features `at` [m]."""

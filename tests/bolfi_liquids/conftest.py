@@ -130,9 +130,12 @@ def criticism_summary():
     """Of a criticism that names and accepts one effect."""
     nowhere = {"channel": None, "start_s": None, "stop_s": None, "stroke": None}
     stroke = {"channel": "xz", "start_s": 1.0, "stop_s": 2.0, "stroke": 1}
-    verdict = SourceVerdict(VerdictKind.EFFECT, ("camera_delay",), 0.002, (), 1)
+    shares = {"none": 0.01, "camera_delay": 0.97, "none of these": 0.02}
+    verdict = SourceVerdict(VerdictKind.EFFECT, ("camera_delay",), 0.002, 0.97, shares, {}, (), 1)
+    alone = ("probabilities", "limits")  # of a source
+    common = {key: of for key, of in vars(verdict).items() if key not in alone}
     return CriticismSummary(
-        **vars(verdict),
+        **common,
         accepted=("camera_delay",),
         requested=(),
         unsupported=(),
@@ -204,6 +207,8 @@ def _effects(status):
         "snr": [14.0, 3.5, 0.4],
         "score": [11.0, -4.0, 1.0],
         "side": [0.0, 0.0, 1.0],
+        "smallest": [0.01, 0.02, np.nan],
+        "limit": [0.02, 0.03, 1.4],
         "gain": [286.0, -20.0, 4.0] if fitted else [np.nan] * 3,
         "p_value": [0.8, 0.003, 0.002] if fitted else [np.nan] * 3,
         "coefficient": [0.05, 0.8, 1.4],
@@ -218,7 +223,7 @@ def _effects(status):
 def _held_out(holds):
     at = ("explanation", "recording")
     sizes = {"before": 0.03, "after": 0.01, "noise": 0.008, "floor": 0.012}
-    sizes |= {"p_value": 0.4, "lpd_gain": 33.3}
+    sizes |= {"p_before": 0.001, "p_value": 0.4, "lpd_gain": 33.3}
     columns = {key: (at, [[value]]) for key, value in sizes.items()}
     return xr.Dataset(
         {**columns, "holds": ("explanation", [holds])},

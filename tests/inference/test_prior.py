@@ -8,6 +8,13 @@ import jax
 import numpy as np
 import numpyro.distributions as dist
 import pytest
+from bolfi_liquids.inference.gp.process import (
+    BOTH_TAILS,
+    LOWER_TAIL,
+    NO_TAIL,
+    UPPER_TAIL,
+    coordinates,
+)
 from numpyro.distributions.transforms import ExpTransform
 from scipy import stats
 
@@ -145,8 +152,8 @@ def test_units_and_descriptions_are_kept():
     assert described["share"] == {"prior": "Beta(concentration1=2, concentration0=2)"}
 
 
-def test_which_priors_are_seen_as_normal_scores():
-    """Those that fade out, or whose logs do; not those that end abruptly."""
+def test_at_which_ends_priors_fade_out():
+    """They, or their logs; what ends abruptly does not."""
     prior = inference.Prior(
         {
             "box": dist.Uniform(-1.0, 2.0),
@@ -156,9 +163,26 @@ def test_which_priors_are_seen_as_normal_scores():
             "rate": dist.Gamma(2.0, 1.0),
             "arcsine": dist.Beta(0.5, 0.5),
             "middle": dist.TruncatedNormal(0.0, 1.0, low=-0.5, high=0.5),
+            "half": dist.HalfNormal(0.3),
+            "wait": dist.Exponential(2.0),
+            "below": dist.TruncatedNormal(1.0, 0.5, high=1.0),
         }
     )
-    assert prior.normal.tolist() == [False, False, True, True, True, False, False]
+    ends = [NO_TAIL, NO_TAIL, BOTH_TAILS, BOTH_TAILS, UPPER_TAIL, NO_TAIL, NO_TAIL]
+    assert prior.tails.tolist() == [*ends, UPPER_TAIL, UPPER_TAIL, LOWER_TAIL]
+
+
+@pytest.mark.parametrize("kind", [NO_TAIL, BOTH_TAILS, UPPER_TAIL, LOWER_TAIL])
+def test_scores_have_the_mean_and_sd_of_quantiles(kind):
+    u = (np.arange(100_000) + 0.5) / 100_000
+    at = coordinates(u[:, None], np.array([kind]))[:, 0]
+    assert (np.diff(at) > 0.0).all()
+    assert at.mean() == pytest.approx(0.5, abs=1e-3)
+    assert at.std() == pytest.approx(12.0**-0.5, rel=1e-3)
+    # a prior of half a normal is linear in them
+    if kind == UPPER_TAIL:
+        value = stats.halfnorm.ppf(u)
+        assert np.corrcoef(value, at)[0, 1] > 1.0 - 1e-9
 
 
 def test_names_of_the_results_columns_are_reserved(prior, observed, simulate):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
-from bolfi_liquids.inference.criticism import Gap
+from bolfi_liquids.inference.criticism import Gap, Sensitivity
 
 from bolfi_liquids.criticism import criticism_file
 from bolfi_liquids.criticism.criticism_file import (
@@ -38,7 +38,8 @@ def found_in(stirs, pours=None):
 def source(accepted, extended):
     base = SimpleNamespace(hypothesis=model((), 0.0), signatures=())
     concluded = {"accepted": accepted, "extended": extended, "base": base}
-    return SimpleNamespace(**concluded, gaps={}, suggestions=(), confusion=np.zeros((0, 0)))
+    shown = {"gaps": {}, "suggestions": (), "probabilities": {}, "confusion": np.zeros((0, 0))}
+    return SimpleNamespace(**concluded, **shown)
 
 
 @pytest.fixture
@@ -126,6 +127,7 @@ def test_each_effect_has_one_row_that_says_what_became_of_it():
         singles=singles,
         units=dict.fromkeys(names, "1"),
         untested=("gripper_scale", "adhesion"),
+        sensitivities=dict.fromkeys(names, Sensitivity(0.5, 1.5)),
         refuted=(("camera_delay",),),
         verdict=SimpleNamespace(kind="effect", effects=("stick_mass",)),
     )
@@ -157,9 +159,8 @@ def hypothesis(difference):
 
 def test_gaps_and_residuals_are_observed_less_expected():
     before, after = hypothesis([5.0, -5.0, 5.0, -5.0]), hypothesis([3.0, -3.0, 3.0, -3.0])
-    gap = Gap(
-        "third", before=10.0, after=6.0, noise=3.0, model_error=4.0, floor=0, p_value=1, lpd_gain=0
-    )
+    sizes = {"before": 10.0, "after": 6.0, "noise": 3.0, "model_error": 4.0, "floor": 0.0}
+    gap = Gap("third", **sizes, p_before=0.0, p_value=1.0, lpd_gain=0.0)
     found = SimpleNamespace(
         leading=SimpleNamespace(hypothesis=after, names=after.names),
         base=SimpleNamespace(hypothesis=before),

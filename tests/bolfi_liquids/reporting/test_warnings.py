@@ -88,7 +88,9 @@ def warned(calibration, criticism_summary, made):
 
 CONTRADICTION = GivenPour(2, 30.0, 1.2, 0.127, 0.02, 0.001, 0.02)
 GIVEN = GivenSummary("oil.csv", "0", "", (2,), (CONTRADICTION,), CONTRADICTION, ACTION)
-UNEXPLAINED = PourVerdict(VerdictKind.UNKNOWN, (), 0.003, (), 0, before=0.4, after=None)
+UNEXPLAINED = PourVerdict(
+    VerdictKind.UNKNOWN, (), 0.003, 0.9, {}, {}, (), 0, before=0.4, after=None
+)
 OLD = "pour.nc is older; make it again: bolfi-liquids pour RUN"
 
 
@@ -112,7 +114,7 @@ def hold(*numbers):
         ({"criticism": {"baseline": 0}}, ["--baseline"]),
         ({"criticism": {"frame_faults": ("other.nc: turned",)}}, ["other.nc: turned", "again"]),
         ({"criticism": {"verdict": VerdictKind.UNKNOWN}}, ["differ", "0.002"]),
-        ({"criticism": CONFIRMED | {"held_out": 0}}, ["may be stick mass"]),
+        ({"criticism": CONFIRMED | {"held_out": 0}}, ["probably stick mass"]),
         ({"criticism": CONFIRMED | {"pours": UNEXPLAINED}}, ["pours differ", "0.003"]),
         ({"pour": {"expected_spillage": 0.12}}, ["12 %"]),
         ({"action": {"rate": 3.0, "distance": 0.07}}, ["the fastest and the farthest"]),

@@ -3,17 +3,34 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.held_out import holds
-from bolfi_liquids.inference.criticism.verdict import conclude, near_best
+from bolfi_liquids.inference.criticism.verdict import (
+    CREDIBLE,
+    NONE,
+    OTHER,
+    PRIOR,
+    conclude,
+    near_best,
+    probabilities,
+)
+from scipy.stats import beta, norm
 
 REJECTED = criticism.Check(0.001, 0.001, 0.2, {})
 FITS = criticism.Check(0.4, 0.3, 0.5, {})
-CONFIRMS = criticism.Gap("", 1.0, 0.3, 0.3, 0.2, 0.4, 0.5, 5.0)
-REFUTES = CONFIRMS._replace(p_value=0.001)
+EFFECTS = 3
 
-BEHIND = {("drag",): 0.0, ("tilt",): 3.9, ("delay",): 4.1}  # in log likelihood
+
+def gap(before, after, p_value, gain):
+    """Beyond noise of .3 and a model error of .2."""
+    return criticism.Gap("", before, after, 0.3, 0.2, 0.4, 0.001, p_value, gain)
+
+
+CONFIRMS = gap(1.0, 0.3, 0.5, 5.0)
+NO_GAP = gap(0.35, 0.3, 0.5, 20.0)
+REFUTES = CONFIRMS._replace(p_value=0.001)
 
 
 def candidate(*names, gain, p_value=0.4, **more):
@@ -23,8 +40,12 @@ def candidate(*names, gain, p_value=0.4, **more):
     return criticism.Candidate(SimpleNamespace(names=names), check, gain, **more)
 
 
+def concluded(*candidates, base=REJECTED):
+    return conclude(base, candidates, probabilities(base, candidates, EFFECTS))
+
+
 def verdict(*candidates, base=REJECTED):
-    found = conclude(base, candidates)
+    found = concluded(*candidates, base=base)
     return found.kind, found.effects
 
 
@@ -38,10 +59,16 @@ def test_the_one_explanation_that_fits_is_named_also_a_pair():
     assert verdict(candidate("drag", "tilt", gain=20.0)) == ("effect", ("drag", "tilt"))
 
 
-def test_explanations_that_are_nearly_as_good_are_tied():
-    drag, near, far = (candidate(*one, gain=20.0 - behind) for one, behind in BEHIND.items())
-    assert verdict(near, drag) == ("tie", ("drag", "tilt"))
-    assert verdict(far, drag) == ("effect", ("drag",))
+def test_explanations_are_named_until_the_right_one_is_among_them():
+    """Of two, one is named alone where it is nine times as probable as the other."""
+    drag = candidate("drag", gain=20.0)
+    for behind in np.arange(0.25, 5.0, 0.25):
+        tilt = candidate("tilt", gain=20.0 - behind)
+        found = probabilities(REJECTED, [drag, tilt], EFFECTS)
+        assert found["drag"] / found["tilt"] == pytest.approx(np.exp(behind))
+        alone = verdict(drag, tilt) == ("effect", ("drag",))
+        assert alone == (found["drag"] >= CREDIBLE)
+        assert alone or verdict(tilt, drag) == ("tie", ("drag", "tilt"))
 
 
 def test_held_out_data_tell_explanations_apart():
@@ -51,34 +78,84 @@ def test_held_out_data_tell_explanations_apart():
     assert verdict(*confirmed) == ("tie", ("drag", "tilt"))
     better = replace(tilt, gaps=(CONFIRMS._replace(lpd_gain=12.0),))
     assert verdict(confirmed[0], better) == ("effect", ("tilt",))
+    assert "probably" not in concluded(confirmed[0], better).reason
+    assert "probably" in concluded(drag).reason  # nothing was held out
+
+
+def test_nothing_is_named_alone_where_held_out_data_show_no_gap():
+    """Whatever its probability, which stays what it is."""
+    drag = candidate("drag", gain=30.0, gaps=(NO_GAP,))
+    tilt = candidate("tilt", gain=20.0, gaps=(NO_GAP,))
+    assert probabilities(REJECTED, [drag, tilt], EFFECTS)["drag"] > 0.99
+    assert verdict(tilt, drag) == ("tie", ("drag", "tilt"))
+    shown = [replace(one, gaps=(CONFIRMS,)) for one in (drag, tilt)]
+    assert verdict(*shown) == ("effect", ("drag",))
 
 
 @pytest.mark.parametrize(
     "poor",
     [
-        candidate("drag", gain=20.0, p_value=0.01),
-        candidate("drag", gain=2.0),
+        candidate("drag", gain=20.0, p_value=0.005),
         candidate("drag", gain=20.0, unpredicted="it raised"),
         candidate("drag", gain=20.0, gaps=(REFUTES,)),
+        candidate("drag", gain=20.0, gaps=(NO_GAP,)),
         candidate("drag", gain=20.0, refitted=False),
-        candidate("drag", gain=20.0, needed=False),
     ],
-    ids=["misfit", "gains nothing", "not predicted", "refuted", "not refitted", "not needed"],
+    ids=["misfit", "not predicted", "refuted", "no gap", "not refitted"],
 )
 def test_what_explains_nothing_is_not_named(poor):
     assert verdict(poor) == ("unknown", ())
-    good = {"gaps": (), "unpredicted": "", "refitted": True, "needed": True}
+    good = {"gaps": (), "unpredicted": "", "refitted": True}
     better = replace(poor, check=FITS, gain=20.0, **good)
     assert verdict(better) == ("effect", ("drag",))
 
 
+def test_an_effect_that_gains_little_is_not_named():
+    """A p-value that is small by chance is more probable than that."""
+    chance = criticism.Check(0.04, 0.04, 0.04, {})
+    weak = candidate("drag", gain=2.0, occam=-2.0)
+    assert verdict(weak, base=chance) == ("none", ())
+
+
+def test_a_second_effect_must_be_worth_its_prior():
+    alone = candidate("drag", gain=20.0, occam=-2.0)
+    pairs = [candidate("drag", "tilt", gain=20.0 + g, occam=-4.0) for g in (1.0, 12.0)]
+    assert verdict(alone, pairs[0])[1] == ("drag",)
+    assert verdict(alone, pairs[1])[1] == ("drag", "tilt")
+
+
+def test_probabilities_are_those_of_bayes_rule():
+    """One normal datum of variance 1 whose mean is 0, or N(0, 3^2) if an effect acts: the exact
+    ratio of evidences, by its gain and the share of the prior that explains it (Laplace)."""
+    datum, sd = 2.5, 3.0
+    variance = 1.0 / (1.0 + sd**-2)
+    gain = 0.5 * datum**2 * variance  # at the mode of the posterior, prior density included
+    occam = 0.5 * np.log(variance) - np.log(sd)
+    exact = norm.logpdf(datum, scale=np.hypot(1.0, sd)) - norm.logpdf(datum)
+    assert gain + occam == pytest.approx(exact)
+    found = probabilities(FITS, [candidate("drag", gain=gain, occam=occam)], EFFECTS)
+    expected = np.exp(exact) * PRIOR.one / EFFECTS / PRIOR.none
+    assert found["drag"] / found[NONE] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("p_value", [0.003, 0.01, 0.1, 0.7])
+def test_a_p_value_tells_whether_something_else_is_missing(p_value):
+    """Right explanations have uniform p-values, wrong ones Beta(0.01, 1)."""
+    found = probabilities(REJECTED, [candidate("drag", gain=60.0, p_value=p_value)], EFFECTS)
+    ends = p_value - 0.003, p_value
+    wrong = np.diff(beta(0.01, 1.0).cdf(ends))[0]
+    expected = PRIOR.other / (1.0 - PRIOR.other) * wrong / 0.003
+    assert found[OTHER] / found["drag"] == pytest.approx(expected)
+    assert sum(found.values()) == pytest.approx(1.0)
+
+
 def test_held_out_data_decide_only_where_there_is_something_to_explain():
     """An effect may be tried on data with which the base model agrees, if the user asks."""
-    refuted = [candidate("drag", gain=20.0, unpredicted="it raised")]
-    found = conclude(REJECTED, refuted)
+    refuted = candidate("drag", gain=20.0, unpredicted="it raised")
+    found = concluded(refuted)
     assert (found.kind, found.effects) == ("unknown", ())
-    assert "drag" in found.reason and found.reason != conclude(REJECTED, []).reason
-    agreeing = conclude(FITS, refuted)
+    assert "drag" in found.reason and found.reason != concluded().reason
+    agreeing = concluded(refuted, base=FITS)
     assert agreeing.kind == "none" and "differ" not in agreeing.reason
 
 
@@ -98,7 +175,7 @@ def test_the_best_and_what_fits_already_are_refitted():
 
 def test_gains_of_several_recordings_add_up_and_each_may_veto():
     def of(gain, p_value=0.5):
-        return criticism.Gap("", 1.0, 0.5, 0.3, 0.2, 0.4, p_value, gain)
+        return gap(1.0, 0.5, p_value, gain)
 
     assert not holds([of(2.0)])
     assert holds([of(2.0), of(2.0)]) and holds([])
@@ -107,12 +184,12 @@ def test_gains_of_several_recordings_add_up_and_each_may_veto():
 
 def test_most_of_a_gap_must_go_unless_it_may_be_noise():
     """Beyond noise of .3 and a model error of .2, in quadrature; .4 of noise is rare."""
-    small = criticism.Gap("", 0.45, 0.39, 0.3, 0.2, 0.4, 0.5, 20.0)
+    small = gap(0.45, 0.39, 0.5, 20.0)
     assert small.unexplained[1] > 0.5 * small.unexplained[0]
     assert holds([small])
-    large = [criticism.Gap("", 1.0, after, 0.3, 0.2, 0.4, 0.5, 20.0) for after in (0.55, 0.6)]
+    large = [gap(1.0, after, 0.5, 20.0) for after in (0.55, 0.6)]
     assert [one.unexplained[1] / one.unexplained[0] < 0.5 for one in large] == [True, False]
     assert [holds([one]) for one in large] == [True, False]
     # a recording that shows nothing of it takes nothing away
-    indifferent = criticism.Gap("", 0.45, 0.45, 0.3, 0.2, 0.4, 0.5, 0.0)
+    indifferent = gap(0.45, 0.45, 0.5, 0.0)
     assert holds([large[0]._replace(after=0.4), indifferent]) and not holds([indifferent])
