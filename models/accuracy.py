@@ -6,7 +6,14 @@ Points = tuple[tuple[float, float], ...]
 """Viscosities [Pa s] and the RMS error of the inclination at each [deg]; constant beyond them, and
 between two of them a power of the viscosity."""
 
-USUAL_ERRORS: Points = ((0.03, 0.5), (0.05, 0.45), (0.1, 0.3), (0.3, 0.05))
+USUAL_ERRORS: Points = (
+    (0.03, 0.5),
+    (0.05, 0.45),
+    (0.1, 0.3),
+    (0.3, 0.04),
+    (1.0, 0.03),
+    (6.0, 0.05),
+)
 """As measured on stars at 5 to 10 cm/s; a circle in water leaves 1.0."""
 LARGEST_ERRORS: Points = ((0.03, 0.6), (0.05, 0.55), (0.1, 0.36), (0.3, 0.1))
 """What `make against` allows."""

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 PREDICTIVE_DRAWS = 8
 THETA_STAR_REPLICATES = 4  # seeds at theta*, for the noise between seeds
 GRID_POINTS = 61  # of either half of an axis of the surface
+GRID_SCORES = 3.5  # normal score of the posterior's last quantile on it, to either side
 
 
 def fit_recordings(
@@ -246,9 +247,11 @@ def _surface(fit: "Fit") -> "Dataset":
     prior, population = fit.prior, fit.population
     shares = np.linspace(0.0, 1.0, GRID_POINTS)
     even = prior.from_unit(np.repeat(shares[:, None], len(prior), axis=1))
+    # even in normal scores, so that the tails of a narrow posterior are resolved, too
+    tailed = ndtr(np.linspace(-GRID_SCORES, GRID_SCORES, GRID_POINTS))
     drawn = prior.from_unit(ndtr(population.x))
     axes = {
-        name: np.union1d(even[name], weighted_quantiles(values, population.weights, list(shares)))
+        name: np.union1d(even[name], weighted_quantiles(values, population.weights, list(tailed)))
         for name, values in drawn.items()
     }
     mesh = np.meshgrid(*axes.values(), indexing="ij")

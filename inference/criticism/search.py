@@ -215,15 +215,16 @@ def explain(
 
 def unsought(base: Base) -> list[Candidate]:
     """Explanations by one effect where none was looked for; first fits tell less than scores."""
-
-    def gain(name: str) -> float:
-        score, side = base.check.scores.get(name, 0.0), base.signatures[name].side
-        return 0.5 * (max(side * score, 0.0) if side else score) ** 2
-
     return [
-        Candidate(one, base.check, gain(name), one.occam, refitted=True)
+        Candidate(one, base.check, promised_gain(base, name), one.occam, refitted=True)
         for name, one in base.singles.items()
     ]
+
+
+def promised_gain(base: Base, name: str) -> float:
+    """Log likelihood that an effect may gain by its score: half of its square (Rao 1948)."""
+    score, side = base.check.scores.get(name, 0.0), base.signatures[name].side
+    return 0.5 * (max(side * score, 0.0) if side else score) ** 2
 
 
 class Search:
@@ -244,7 +245,11 @@ class Search:
         """The extended model, tested."""
         tested, _ = self.study.check(hypothesis, self.base.signatures)
         gain = hypothesis.gain(self.base.hypothesis)
-        return Candidate(hypothesis, tested, gain, hypothesis.occam, refitted)
+        name, *others = hypothesis.names
+        promise = 0.0 if others else promised_gain(self.base, name)
+        return Candidate(
+            hypothesis, tested, gain, hypothesis.occam, refitted=refitted, promise=promise
+        )
 
     def visit(
         self, phase: str, candidates: Sequence[Candidate], count: int, narrowing: int = 0
@@ -278,7 +283,10 @@ class Search:
         return boxes
 
     def refit(self, candidates: Sequence[Candidate]) -> None:
-        """Visit candidates until their fits are settled and pass, or are behind those that do."""
+        """Visit candidates until their fits are settled and pass, or are behind those that do.
+
+        A fit that is not settled may come to what the effect's score promises.
+        """
         for attempt in range(REFIT_PASSES):
             before = {one.names: one.gain for one in candidates}
             count = max(self.study.plan.refit, FULL_PASS // max(len(candidates), 1))
@@ -292,8 +300,9 @@ class Search:
             candidates = []
             for one in tried:
                 gained = one.gain - before[one.names]
-                done = one.passes and settled(gained, one.hypothesis, boxes[one.names])
-                if one.gain + abs(gained) > due and not done:
+                known = settled(gained, one.hypothesis, boxes[one.names])
+                reach = max(one.gain + abs(gained), 0.0 if known else one.promise)
+                if reach > due and not (one.passes and known):
                     candidates.append(one)
             if not candidates:
                 break

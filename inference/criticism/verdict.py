@@ -66,6 +66,7 @@ class Candidate:
         occam: Log of the share of the coefficients' prior that explains the data as well.
         refitted: Whether runs near its best parameters were made for it; what was not is not
             accepted.
+        promise: Gain that the base model's score of the effect promises.
         gaps: On the held-out data, where it was compared with them.
         unpredicted: Why it could not be simulated for held-out data; "" where it could.
     """
@@ -75,8 +76,14 @@ class Candidate:
     gain: float
     occam: float = 0.0
     refitted: bool = False
+    promise: float = 0.0
     gaps: tuple[Gap, ...] = ()
     unpredicted: str = ""
+
+    @property
+    def potential(self) -> float:
+        """Gain that it may have; the few runs of a first fit may not come near to it."""
+        return self.gain if self.refitted else max(self.gain, self.promise)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -131,11 +138,11 @@ class Verdict:
 
 def near_best(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
     """Those worth a refit, best first."""
-    least = FAR_BEHIND * max((c.gain for c in candidates), default=0.0)
+    least = FAR_BEHIND * max((c.potential for c in candidates), default=0.0)
     # one that passes already must be looked at, however far behind
-    worth = [c for c in candidates if c.gain > max(least, 0.0) or c.passes]
-    ranked = sorted(worth, key=lambda c: -c.gain)
-    others = sorted(ranked[1:], key=lambda c: (not c.passes, -c.gain))
+    worth = [c for c in candidates if c.potential > max(least, 0.0) or c.passes]
+    ranked = sorted(worth, key=lambda c: -c.potential)
+    others = sorted(ranked[1:], key=lambda c: (not c.passes, -c.potential))
     return (ranked[:1] + others)[:count]
 
 

@@ -44,12 +44,12 @@ def test_the_known_error_has_its_size_and_the_correlation_of_the_recording(stirr
     assert covariance[0, 1] > 0.5 * covariance[0, 0]
 
 
-def test_the_known_error_falls_smoothly_with_the_viscosity():
+def test_the_known_error_changes_smoothly_with_the_viscosity():
     viscosities = np.geomspace(1e-4, 20.0, 400)
     sizes = [stirring_error(one) for one in viscosities]
     steps = np.diff(np.log(sizes)) / np.diff(np.log(viscosities))
-    assert (steps <= 1e-9).all() and (steps >= -2.0).all()
-    assert stirring_error(0.0) == stirring_error(0.001) > stirring_error(1.0)
+    assert np.abs(steps).max() < 2.0
+    assert stirring_error(0.0) == stirring_error(0.001) > 10.0 * stirring_error(1.0)
     assert np.isnan(stirring_error(np.nan))
 
 

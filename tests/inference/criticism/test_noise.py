@@ -228,6 +228,21 @@ def test_what_is_learned_in_another_regime_counts_little(clean):
     assert beside.freedom == pytest.approx(2.0, abs=1e-3)
 
 
+@pytest.mark.parametrize(("distance", "weight"), [(0.0, 1.0), (2.0, np.exp(-2.0)), (6.0, 0.0)])
+def test_a_known_error_counts_as_clean_data_of_this_regime(clean, distance, weight):
+    """Clean data far away say nothing, also where there are no nearer ones."""
+    known = criticism.model_error(2.0, 0.8 ** np.arange(40), 3.0)
+    data = [criticism.CleanData(one, NOTHING, True, distance) for one in clean[:2]]
+    found = criticism.learned_model_error(data, known)
+    alone = criticism.learned_model_error(data)
+    expected = (3.0 * 2.0**2 + 2.0 * weight * alone.autocovariance[0]) / (3.0 + 2.0 * weight)
+    assert found.autocovariance[0] == pytest.approx(expected, rel=0.01)
+    assert found.freedom == pytest.approx(3.0 + 2.0 * weight, abs=1e-3)
+    for *_, taught in found.leave_one_out():  # each by the known error and the other
+        assert taught.freedom == pytest.approx(4.0, abs=1e-3)
+    assert criticism.learned_model_error([], known) is known
+
+
 def test_the_covariance_is_positive_semidefinite():
     """Also where the noise exceeds the residuals, they alternate, or the data are longer."""
     rng = np.random.default_rng(0)

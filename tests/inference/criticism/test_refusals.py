@@ -146,6 +146,7 @@ PARTS = {
     "learned_model_error": [
         (lambda: criticism.learned_model_error([]), "clean"),
         (lambda: criticism.learned_model_error([3]), "clean"),
+        (lambda: criticism.learned_model_error([], 3), "known"),
         (lambda: criticism.learned_model_error([clean(), clean(np.ones((9, 2)))]), "clean"),
         (lambda: criticism.learned_model_error([clean(), clean(np.ones((8, 1)))]), "clean"),
     ],

@@ -204,6 +204,11 @@ def test_the_best_and_what_fits_already_are_refitted():
     assert near_best([worst], 3) == near_best(others, 0) == []
     behind = candidate("behind", gain=4.0, p_value=0.001)
     assert behind not in near_best([*others, behind], 9)
+    # a first fit may be poor; a refit is not
+    promising = replace(behind, promise=9.5, refitted=False)
+    assert near_best([*others, promising], 2)[1] is promising
+    refitted = replace(promising, refitted=True)
+    assert refitted not in near_best([*others, refitted], 9)
 
 
 def test_gains_of_several_recordings_add_up_and_each_may_veto():
