@@ -214,8 +214,8 @@ def regime_distance(
 def model_error(
     stirring: StirSimulator, viscosity: float, clean: Sequence[Clean] = ()
 ) -> "ModelError":
-    """The simulator's error on a run's recordings, or on planned ones, in a liquid of so many Pa s;
-    learned from clean recordings where there are any.
+    """The simulator's error on a run's recordings, in a liquid of so many Pa s; learned from clean
+    recordings where there are any.
 
     Without them it has two parts. One, of size `models.stirring_error`, is correlated as the
     recorded inclination is: in the reference's oil the simulated stick swings as if the viscosity
@@ -228,10 +228,7 @@ def model_error(
     learned = usual_for(stirring, clean, viscosity)
     if learned is not None:
         return learned
-    seen = np.isfinite(stirring.observed).any()
-    paths = [recording.gripper.position[:, :2] for recording in stirring.recordings]
-    # the stick swings as the gripper moves
-    swings = rhythm(stirring.observed if seen else np.concatenate(paths))
+    swings = rhythm(stirring.observed)
     lags = frame_interval(stirring.recordings[0]) * np.arange(len(swings))
     share = SHORT_PART**2
     correlation = (swings + share * np.exp(-lags / SHORT_TIME)) / (1.0 + share)
