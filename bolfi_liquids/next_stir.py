@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .calibration.model_error import model_error, noise_beside
-from .calibration.stirs import camera_noise, stir_experiment
+from .calibration.stirs import camera_noise, sensor_noise, stir_experiment
 from .criticism.result import calibration_to_pour
 from .inputs.settings import CriticismSettings
 from .motions import FILE, Motion, family, keep_motion, planned
@@ -21,6 +21,7 @@ from .simulators import StirSimulator, stir_simulator
 if TYPE_CHECKING:
     from .inference.criticism import Proposal
     from .inference.criticism.design import Rival
+    from .inference.criticism.study import Study
     from .inference.simulations import Workers
 
 MOTIONS = 8
@@ -81,49 +82,59 @@ def design_stir(
         particles = int(known.record["settings"]["particles"])
         stirring = stir_simulator(run.recordings[:1], particles)
         motions = family(stirring, MOTIONS)
-        viscosity = float(np.median(posterior["viscosity"]))
-        proposals = list(_proposals(stirring, motions, viscosity))
+        middle = {name: float(np.median(of)) for name, of in posterior.items()}
         sd = float(np.std(np.log(posterior["viscosity"])))
         apart = max(2.0 * sd, float(np.log(MIN_RATIO)))
         with run.bank() as bank, phases(shown=progress) as report:
             own = replace(compute, batch=CriticismSettings.batch, bank=bank)
             fitted = stir_experiment(stirring, camera_noise(run.recordings), None, "stir")
             study = Study(fitted, run.prior, {}, own, seed=seed, report=report)
-            found = suggest(study, proposals, _rivals(posterior, viscosity, apart, seed))
+            proposals = list(_proposals(study, stirring, motions, middle))
+            found = suggest(study, proposals, _rivals(posterior, middle, apart, seed))
         if not found:
             raise RuntimeError(f"{run.path}: none of the proposed stirs could be simulated")
         best = found[0]
         motion = {one.label: asdict(one) for one in motions}.get(best.label)
         keep_motion(run.path, motion)
     after = sd * remaining_sd(best.snr, apart / sd)
-    return NextStir(best.label, best.cost, sd, after, motion and run.path / FILE)
+    return NextStir(best.label, best.cost, sd, after, run.path / FILE if motion else None)
 
 
 def _proposals(
-    stirring: StirSimulator, motions: Sequence[Motion], viscosity: float
+    study: "Study", stirring: StirSimulator, motions: Sequence[Motion], theta: Mapping[str, float]
 ) -> "Iterator[Proposal]":
-    """The recorded stir again, and the motions; the simulator errs in the rhythm of each."""
-    from .inference.criticism import Proposal
+    """The recorded stir again, and the motions, but for those that cannot be simulated at theta.
 
+    The simulator errs as the stick swings, so each is simulated once to see how it does.
+    """
+    from .inference.criticism import KnownNoise, Proposal
+
+    at = {name: np.array([value]) for name, value in theta.items()}
     plans = {AGAIN: stirring} | {motion.label: planned(stirring, motion) for motion in motions}
     for label, plan in plans.items():
-        noise = noise_beside(stirring, model_error(plan, viscosity))
-        duration = float(np.ptp(plan.time))
-        yield Proposal(plan.batched, noise, plan.observed.shape, plan.identity, label, duration)
+        shape, duration = plan.observed.shape, float(np.ptp(plan.time))
+        noise = KnownNoise(sensor_noise(stirring.observed))
+        proposal = Proposal(plan.batched, noise, shape, plan.identity, label, duration)
+        (made,) = study.run_each("response", [at], proposal)
+        for signal in made.signals:
+            swung = replace(plan.recordings[0], inclination=signal)
+            error = model_error(StirSimulator((swung,), plan.setups), theta["viscosity"])
+            yield replace(proposal, noise=noise_beside(stirring, error))
 
 
 def _rivals(
-    posterior: Mapping[str, np.ndarray], viscosity: float, apart: float, seed: int
+    posterior: Mapping[str, np.ndarray], middle: Mapping[str, float], apart: float, seed: int
 ) -> "dict[str, Rival]":
-    """A thin and a thick liquid about a viscosity [Pa s], so far apart in its log; what else is
-    unknown is the median, then as drawn."""
+    """A thin and a thick liquid about the middle, so far apart in the viscosity's log; what else
+    is unknown is as in the middle, then as drawn."""
     from .inference.criticism.design import RIVAL_DRAWS, Rival
 
     rng = generator(seed, Phase.POSTERIOR_DRAWS)
     rows = rng.integers(len(posterior["viscosity"]), size=RIVAL_DRAWS - 1)
-    theta = {name: np.append(np.median(of), of[rows]) for name, of in posterior.items()}
+    theta = {name: np.append(middle[name], of[rows]) for name, of in posterior.items()}
+    same = np.ones(RIVAL_DRAWS)
     thin, thick = (
-        theta | {"viscosity": np.full(RIVAL_DRAWS, viscosity * np.exp(side * apart / 2.0))}
+        theta | {"viscosity": middle["viscosity"] * np.exp(side * apart / 2.0) * same}
         for side in (-1.0, 1.0)
     )
     return {"thin": Rival(thin, 0.5), "thick": Rival(thick, 0.5)}

@@ -216,10 +216,7 @@ def known_error(stirring: StirSimulator, size: float) -> "ModelError":
     """
     from ..inference.criticism import model_error, rhythm
 
-    seen = np.isfinite(stirring.observed).any()
-    paths = [recording.gripper.position[:, :2] for recording in stirring.recordings]
-    # the stick of a motion that is only planned swings as the gripper moves
-    swings = rhythm(stirring.observed if seen else np.concatenate(paths))
+    swings = rhythm(stirring.observed)
     lags = frame_interval(stirring.recordings[0]) * np.arange(len(swings))
     share = SHORT_PART**2
     correlation = (swings + share * np.exp(-lags / SHORT_TIME)) / (1.0 + share)
