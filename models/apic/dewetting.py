@@ -1,0 +1,27 @@
+# type: ignore  (Taichi compiles this source and gives these names their types)
+"""Films that walls do not hold, as the liquid does not wet them.
+
+On a wall that a liquid meets at an angle a beyond 90 degrees, each area that it covers costs
+-sigma cos a. So a film of thickness e draws back (Redon, Brochard-Wyart and Rondelez 1991,
+"Dynamics of dewetting") and gathers until its weight spreads it no further. Covering a share s, it
+is e / s thick and has the energy rho g e^2 / (2 s) - s sigma cos a, which is least where
+s^2 = rho g e^2 / (-2 sigma cos a); de Gennes, Brochard-Wyart and Quere (2004), section 2.2.3, find
+the thickness of a puddle so. The tension of its own surface is left out, as it acts on the grid.
+
+Under the same weight what is 1 / s times as thick flows 1 / s^2 times as fast (Nusselt 1916): walls
+rub by s^2. It gathers within a cell at a speed of order sigma a^3 / mu, which is not resolved: it
+is gathered at once. Walls that are met at 90 degrees or less hold any film.
+"""
+
+import taichi as ti
+
+from .lanes import lanes
+
+
+@ti.func
+def wall_hold(s, g, a, m):
+    """Share of its friction that the wall at a face has, by how full the liquid leaves the cell
+    before it; thicker films are resolved."""
+    full = s.mass[g, a, m] / ti.max(1.0 - s.solid[a, m], 1e-6)
+    least = ti.min(s.loose[g] / s.cell[None] ** 2, 1.0)
+    return ti.select(least > 0.0, ti.min(full * full / ti.max(least, 1e-12), 1.0), lanes(1.0))
