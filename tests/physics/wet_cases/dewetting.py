@@ -14,7 +14,7 @@ SEEDS = 4  # that are averaged: an edge is a particle or two
 SECONDS = 0.5
 WATCHED = np.array([0.5, 1.5])  # cells that the truth draws back while the speed is taken
 TOLERANCE = 1.2
-"""Of the logarithm of the speed over the truth, whose own logarithm may be a third or thrice that."""
+"""Of the logarithm of the speed over the truth, which is known to a factor of three."""
 STAYS = 0.25  # cells
 
 
