@@ -2,15 +2,17 @@
 """Films that walls do not hold, as the liquid does not wet them.
 
 On a wall that a liquid meets at an angle a beyond 90 degrees, each area that it covers costs
--sigma cos a. So a film of thickness e draws back (Redon, Brochard-Wyart and Rondelez 1991,
-"Dynamics of dewetting") and gathers until its weight spreads it no further. Covering a share s, it
-is e / s thick and has the energy rho g e^2 / (2 s) - s sigma cos a, which is least where
-s^2 = rho g e^2 / (-2 sigma cos a); de Gennes, Brochard-Wyart and Quere (2004), section 2.2.3, find
-the thickness of a puddle so. The tension of its own surface is left out, as it acts on the grid.
+-sigma cos a. So a thin film draws back and gathers until its weight spreads it no further. Where a
+film of thickness e covers a share s of a level wall, it is e / s thick and has the energy
+rho g e^2 / (2 s) - s sigma cos a, which is least at s^2 = rho g e^2 / (-2 sigma cos a). The
+thickness of a puddle is found so, too (de Gennes, Brochard-Wyart and Quere 2004, "Capillarity and
+wetting phenomena", chapter 2); the tension of the film's own surface is left out here, as it acts
+on the grid.
 
-Under the same weight what is 1 / s times as thick flows 1 / s^2 times as fast (Nusselt 1916): walls
-rub by s^2. It gathers within a cell at a speed of order sigma a^3 / mu, which is not resolved: it
-is gathered at once. Walls that are met at 90 degrees or less hold any film.
+Under the same weight what is 1 / s times as thick flows 1 / s^2 times as fast (Nusselt 1916). So
+walls rub by s^2, and edges draw back at a speed of order sigma a^3 / mu (Redon, Brochard-Wyart and
+Rondelez 1991, "Dynamics of dewetting"). Walls that are met at 90 degrees or less hold any film:
+nothing drives it off before it has holes.
 """
 
 import taichi as ti
