@@ -3,6 +3,7 @@
 
 import taichi as ti
 
+from .dewetting import wall_hold
 from .lanes import chosen, lanes, positive, ratio
 from .rheology import (
     LEAST_MASS,
@@ -126,6 +127,8 @@ def solve_viscosity(s, g, step):
             known, u, mass = has_mass(s, g, a, m), s.velocity[g, a, m], s.mass[g, a, m]
             nu = thickness_between(s, g, m, m - S[a])
             rub = s.rub[a, m] * scale * nu
+            if ti.static(s.WETTING):
+                rub *= wall_hold(s, g, a, m)
             r = known * (force(s, g, s.velocity, a, m, S) - rub * u)
             inverse = ratio(known, mass + rub + stiffness(s, g, a, m, S))
             s.friction[g, a, m] = mass + rub

@@ -3,6 +3,7 @@
 
 import taichi as ti
 
+from .gravity import GRAVITY
 from .lanes import LANES
 from .liquid_state import LiquidState
 from .mirror import image, images
@@ -19,6 +20,7 @@ class WettingLiquid(LiquidState):
     Attributes:
         tension: Over density [m³/s²].
         cosine: Of the contact angle.
+        loose: Squared thickness of films that the wall begins to let go [m²]; 0 if it wets.
         open: 1 where liquid may be, or its image.
         wall: Area of wall that rubs at the face, in cells.
         passage: Open share of the face, or 1 in the mirror.
@@ -34,7 +36,9 @@ class WettingLiquid(LiquidState):
         super().__init__(groups, cells, particles, effects)
         self.open = ti.field(ti.f32, cells)
         self.wall, self.passage = (ti.field(ti.f32, (3, cells)) for _ in range(2))
-        self.tension, self.cosine = (ti.Vector.field(LANES, ti.f32, groups) for _ in range(2))
+        self.tension, self.cosine, self.loose = (
+            ti.Vector.field(LANES, ti.f32, groups) for _ in range(3)
+        )
 
     @ti.kernel
     def enter_surfaces(
@@ -60,6 +64,8 @@ class WettingLiquid(LiquidState):
             for lane in range(LANES):
                 self.tension[g][lane] = surface[0, g, lane]
                 self.cosine[g][lane] = surface[1, g, lane]
+                repelled = ti.max(-surface[1, g, lane], 0.0)
+                self.loose[g][lane] = 2.0 * surface[0, g, lane] * repelled / GRAVITY
 
     @ti.func
     def take_step(self, g, step):

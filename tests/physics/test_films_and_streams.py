@@ -7,6 +7,7 @@ from truths import falling_stream, films
 
 GLYCERIN = {"viscosity": 1.4, "density": 1260.0}
 THICKNESS = 2e-3
+ANGLES = np.radians([10.0, 60.0, 110.0, 130.0])
 
 
 def test_jeffreys_film_conserves_mass():
@@ -49,6 +50,14 @@ def test_a_films_flux_is_the_integral_of_its_speed():
     assert flux == pytest.approx(carried)
     surface = films.nusselt_velocity(THICKNESS, THICKNESS, **GLYCERIN)
     assert flux / THICKNESS == pytest.approx(2.0 / 3.0 * surface)
+
+
+def test_an_edge_draws_back_as_wedges_of_its_angle_flow():
+    """Cox 1986 (J. Fluid Mech. 168, 169), equation 8.3, beside a liquid of no viscosity."""
+    speed = films.dewetting_speed(ANGLES, tension=0.063, viscosity=1.0, slip=1.0)
+    for angle, found in zip(ANGLES, speed, strict=True):
+        bent, _ = quad(lambda x: (x - np.sin(x) * np.cos(x)) / (2.0 * np.sin(x)), 0.0, angle)
+        assert found == pytest.approx(0.063 * bent, rel=0.05)
 
 
 def test_a_stream_falls_as_a_stone():

@@ -7,6 +7,7 @@ from wet_cases import (
     capillary_rise,
     contact_angle,
     dam_break,
+    dewetting,
     film_flow,
     meniscus,
 )
@@ -52,6 +53,12 @@ def test_drops_whose_floor_neither_wets_nor_repels_differ_too_little(monkeypatch
     *drops, difference = judged_of(contact_angle, monkeypatch, unwetted)
     assert not difference.passed
     assert not any(row.passed for row in drops if "height, 60" in row.quantity)
+
+
+@pytest.mark.slow
+def test_edges_of_films_on_walls_that_never_repel_are_too_slow(monkeypatch):
+    speeds = [row for row in judged_of(dewetting, monkeypatch, clamped) if "speed" in row.quantity]
+    assert speeds and not any(row.passed for row in speeds)
 
 
 def test_films_at_rest_are_out_of_tolerance(monkeypatch):

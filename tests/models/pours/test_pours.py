@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bolfi_liquids.models import pouring
 from bolfi_liquids.models.apic.geometry import ABOVE, INSIDE, OUTSIDE
 from bolfi_liquids.models.pours import march, vessel
 from bolfi_liquids.models.pours.flights import Flights, landing_of
@@ -67,6 +68,13 @@ def test_pours_land_where_volume_of_fluid_says(cups, name, liquid, hold):
 
 
 @pytest.mark.slow
+def test_a_cup_that_glycerin_does_not_wet_keeps_none_of_it(cups):
+    """As in volume of fluid; at 90 degrees, where walls begin to let films go, it keeps 0.05."""
+    cups = changed(cups, source={"contact_angle_deg": 110.0}, pour={"hold": 2.1})
+    assert models.landings(GLYCERIN, np.radians(45.0), cups, [0]).retained[0] < 0.01
+
+
+@pytest.mark.slow
 def test_a_cup_of_another_size_pours_alike(cups, monkeypatch):
     """Froude's similarity: twice as long, the root of two times as slow to turn, 2^1.5 times the
     viscosity, 4 times the tension, the same wetting."""
@@ -97,10 +105,12 @@ def test_same_bits_again_and_anywhere_in_a_batch(cups):
     """Also after other pours, and beside one that turns so fast that its steps are shorter."""
     rate, seeds = np.radians([180.0, 120.0, 150.0, 900.0]), np.array([1, 2, 3, 4])
     viscosity, cohesion = np.array([0.01, 1.0, 0.01, 0.1]), np.array([0.2, 0.5, 0.9, 0.0])
+    adhesion = np.array([0.0, -1.0, -0.8, 0.3])  # contact angles of 60, 120, 107 and 37 degrees
 
     def landed(part):
         liquid = models.Liquid(viscosity[part], cohesion[part], 1000.0)
-        return models.landings(liquid, rate[part], cups, seeds[part], FEW).position
+        effects = {"adhesion": adhesion[part]}
+        return models.landings(liquid, rate[part], cups, seeds[part], FEW, effects=effects).position
 
     whole = landed([0, 1, 2, 3])
     np.testing.assert_array_equal(landed([3, 2, 1, 0]), whole[::-1])
@@ -210,7 +220,7 @@ def test_the_cup_holds_its_volume_and_its_wall_parts_two_sides(cell):
 def test_cells_too_coarse_or_too_many_are_refused_before_the_first_step(
     cups, monkeypatch, particles, source, message
 ):
-    monkeypatch.setattr(models.pouring, "march", lambda *_: pytest.fail("a pour began"))
+    monkeypatch.setattr(pouring, "march", lambda *_: pytest.fail("a pour began"))
     with pytest.raises(ValueError, match=message):
         models.landings(WATER, 2.0, changed(cups, source=source), [0], particles)
 
