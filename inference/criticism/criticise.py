@@ -230,9 +230,10 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         candidates: list[Candidate] = []
         if accept is not None or base.check.p_value < level:
             candidates = _explanations(study, base, accept, held_out)
-        probability = probabilities(base.check, candidates or unsought(base), len(extensions))
-        verdict = conclude(base.check, candidates, probability, level)
-        members = remaining(probability, candidates)
+        sought = [one for one in candidates if not one.requested]
+        probability = probabilities(base.check, sought or unsought(base), len(extensions))
+        verdict = conclude(base.check, sought, probability, level)
+        members = remaining(probability, sought)
         rivals = _rivals(verdict, candidates, members)
         best = {label(one.names): one.hypothesis.best for one in rivals}
         suggestions = suggest(study, proposals, best)
@@ -337,14 +338,20 @@ def _gaps(
             if model.names not in failed
         }
         gaps = {
-            names: (*gaps[names], gap(one, neutral, made, seed, _without(acting, names)))
+            names: (*gaps[names], gap(one, neutral, made, seed, _rivals_of(names, chosen, acting)))
             for names, made in acting.items()
         }
     return gaps, failed
 
 
-def _without(acting: Mapping[tuple[str, ...], np.ndarray], names: tuple[str, ...]) -> list:
-    return [made for other, made in acting.items() if other != names]
+def _rivals_of(
+    names: tuple[str, ...],
+    chosen: Sequence[Candidate],
+    acting: Mapping[tuple[str, ...], np.ndarray],
+) -> list[np.ndarray]:
+    """Runs of the explanations beside the named one that the search itself found."""
+    found = [one.names for one in chosen if not one.requested]
+    return [made for other, made in acting.items() if other != names and other in found]
 
 
 def _check_others(name: str, given: Any, kind: type) -> None:

@@ -55,7 +55,7 @@ class Gap(NamedTuple):
     @property
     def fits(self) -> bool:
         """Whether noise and model error may be all that is left."""
-        return self.p_value > ACCEPTANCE_LEVEL
+        return self.p_value > ACCEPTANCE_LEVEL / 2.0  # the fitted data are a test, too
 
 
 class Suggestion(NamedTuple):

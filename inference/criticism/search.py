@@ -235,11 +235,14 @@ class Search:
     def singles(self) -> list[Candidate]:
         return [one for one in self.found.values() if len(one.names) == 1]
 
-    def candidate(self, hypothesis: Hypothesis, refitted: bool = False) -> Candidate:
-        """The extended model, tested."""
-        base = self.base.hypothesis
+    def candidate(self, hypothesis: Hypothesis, known: Candidate | None = None) -> Candidate:
+        """The extended model, tested; it keeps what is known of the explanation besides."""
         tested, _ = self.study.check(hypothesis, self.base.signatures)
-        return Candidate(hypothesis, tested, hypothesis.gain(base), hypothesis.occam, refitted)
+        gain = hypothesis.gain(self.base.hypothesis)
+        found = Candidate(hypothesis, tested, gain, hypothesis.occam)
+        if known is None:
+            return found
+        return replace(found, refitted=known.refitted, requested=known.requested)
 
     def visit(
         self, phase: str, candidates: Sequence[Candidate], count: int, narrowing: int = 0
@@ -269,7 +272,7 @@ class Search:
             if one.names in boxes:
                 within = one.hypothesis.within.hull(boxes[one.names])
                 fitted = study.hypothesis(one.names, self.runs, within)
-                self.found[one.names] = self.candidate(fitted, one.refitted)
+                self.found[one.names] = self.candidate(fitted, self.found[one.names])
         return boxes
 
     def refit(self, candidates: Sequence[Candidate]) -> None:
@@ -298,7 +301,7 @@ class Search:
         known = (one for one in self.found.values() if set(one.names) == set(names))
         one = next(known, None) or self.together(names)
         if not one.refitted:
-            self.found[one.names], self.limited = one, False
+            self.found[one.names], self.limited = replace(one, requested=True), False
             self.refit([one])
 
     def together(self, names: tuple[str, ...]) -> Candidate:

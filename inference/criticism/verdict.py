@@ -62,6 +62,7 @@ class Candidate:
         occam: Log of the share of the coefficients' prior that explains the data as well.
         refitted: Whether runs near its best parameters were made for it; what was not is not
             accepted.
+        requested: Whether it was refitted only because the user accepts it: it changes no verdict.
         gaps: On the held-out data, where it was compared with them.
         unpredicted: Why it could not be simulated for held-out data; "" where it could.
     """
@@ -71,6 +72,7 @@ class Candidate:
     gain: float
     occam: float = 0.0
     refitted: bool = False
+    requested: bool = False
     gaps: tuple[Gap, ...] = ()
     unpredicted: str = ""
 
@@ -82,6 +84,11 @@ class Candidate:
     def held(self) -> bool:
         """Whether it held on the held-out data, where there were any."""
         return not self.unpredicted and holds(self.gaps)
+
+    @property
+    def seen(self) -> bool:
+        """Whether held-out data, if there were any, show a gap that it could explain."""
+        return not self.gaps or any(gap.unexplained[0] > 0.0 for gap in self.gaps)
 
     @property
     def evidence(self) -> float:
@@ -133,8 +140,8 @@ def near_best(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
 def probabilities(base: Check, candidates: Sequence[Candidate], effects: int) -> dict[str, float]:
     """Probability of "none", of each explanation and of "none of these".
 
-    What passes but was not refitted counts as none of these; what held-out data contradict has no
-    probability.
+    What passes but was not refitted, and what cannot be simulated for the held-out data, counts as
+    none of these.
 
     Args:
         base: Test of the base model, "none".
@@ -144,8 +151,8 @@ def probabilities(base: Check, candidates: Sequence[Candidate], effects: int) ->
     gaps = next((one.gaps for one in candidates if one.gaps), ())
     share = {1: PRIOR.one / effects, 2: PRIOR.two / max(effects * (effects - 1) / 2, 1)}
     names = [NONE, *(label(one.names) for one in candidates)]
-    held = np.array([True, *(one.held for one in candidates)])
-    possible = held & [True, *(one.refitted or not one.passes for one in candidates)]
+    untested = [one.unpredicted or (one.passes and not one.refitted) for one in candidates]
+    tested = ~np.array([False, *map(bool, untested)])
     prior = [PRIOR.none, *(share.get(len(one.names), share[2]) for one in candidates)]
     evidence = [0.0, *(one.evidence for one in candidates)]
     log_weight = np.log(prior) + evidence
@@ -153,9 +160,8 @@ def probabilities(base: Check, candidates: Sequence[Candidate], effects: int) ->
     tests = [(base.p_value, *(gap.p_before for gap in gaps))]
     tests += [(one.check.p_value, *(gap.p_value for gap in one.gaps)) for one in candidates]
     joint = weight * [_fit_ratio(some) for some in tests]
-    other = PRIOR.other / (1.0 - PRIOR.other) * weight @ held
-    other += joint @ (held & ~possible)
-    joint = np.append(joint * possible, other)
+    other = PRIOR.other / (1.0 - PRIOR.other) * weight.sum() + joint[~tested].sum()
+    joint = np.append(joint * tested, other)
     return dict(zip([*names, OTHER], (joint / joint.sum()).tolist(), strict=True))
 
 
@@ -191,9 +197,7 @@ def remaining(probability: Mapping[str, float], candidates: Sequence[Candidate])
     if not accepted or NONE in found or OTHER in found:
         return []
     ranked = sorted(accepted, key=lambda one: -probability[label(one.names)])
-    gaps = ranked[0].gaps
-    confirmed = not gaps or any(gap.unexplained[0] > 0.0 for gap in gaps)
-    count = max(len(found), 1 if confirmed else 2)
+    count = max(len(found), 1 if ranked[0].seen else 2)
     return ranked[:count] if len(ranked) >= count else []
 
 
@@ -224,6 +228,9 @@ def conclude(
 
 
 def _unexplained(explanations: Sequence[Candidate]) -> str:
+    unseen = [label(one.names) for one in explanations if one.passes and not one.seen]
+    if unseen:
+        return f"{unseen[0]} may explain it, but held-out data show no gap that would confirm it."
     refuted = [label(one.names) for one in explanations if one.passes and not one.held]
     if not refuted:
         return "no known effect explains it."

@@ -196,7 +196,8 @@ def test_a_user_may_accept_another_effect_than_is_named(criticised):
 
 def test_what_a_user_accepts_changes_no_verdict(criticised, drifting):
     for names in (("offset", "drift"), ("drift", "offset")):
-        found = criticised(experiment(drift=0.06), accept=names)
+        held = [held_out(drift=0.06)]
+        found = criticised(experiment(drift=0.06), held_out=held, accept=names)
         assert found.verdict == drifting.verdict
         assert found.accepted == names == tuple(found.coefficients)
         assert found.extended is not None and set(found.extended.names) == set(names)
