@@ -6,6 +6,7 @@ python tests/benchmarks/misfit/table.py study.jsonl [--others others.jsonl]
 import argparse
 import sys
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ STRONG = 10.0  # SNR from which an effect should be named alone
 HIDDEN = 3.0  # SNR below which a rival explains what an effect does
 LEVEL = 0.05  # p-value below which a model is rejected
 FIFTHS = np.linspace(0.0, 1.0, 6)  # of stated probability
+SURE = 0.95  # stated probability, from which a row of its own is made
 BAND = 0.99
 JOIN = " with "
 Result = dict
@@ -122,7 +124,7 @@ def heading(columns: str) -> list[str]:
 def by_ratio(singles: Sequence[Result]) -> list[str]:
     """Detection and naming of single effects."""
     rows = heading("SNR | sets | detected | right alone | tie with it | other tie | wrong name")
-    for low, high in zip(BINS[:-1], BINS[1:], strict=True):
+    for low, high in pairwise(BINS):
         those = between(singles, low, high)
         if those:
             cells = [
@@ -188,20 +190,21 @@ def exact_band(hits: int, count: int) -> tuple[float, float]:
 
 
 def calibration(found: Sequence[Result]) -> list[str]:
-    """The most probable explanation's stated probability, and how often it is right."""
+    """The most probable explanation's stated probability, and how often it is right; by fifths,
+    and once more where that is `SURE`."""
     stated = [(probabilities(r), truth(r)) for r in found]
     best = [max(p, key=lambda one: p[one]) for p, _ in stated]
     top = np.array([p[one] for (p, _), one in zip(stated, best, strict=True)])
     hit = np.array([one == true for (_, true), one in zip(stated, best, strict=True)], bool)
     rows = heading("stated | sets | mean stated | right | 99 % band | holds")
-    for low, high in zip(FIFTHS[:-1], FIFTHS[1:], strict=True):
+    for low, high in [*pairwise(FIFTHS), (SURE, 1.0)]:
         here = (top >= low) & ((top < high) | (high == 1.0))
         if here.any():
             count, hits, mean = int(here.sum()), int(hit[here].sum()), float(top[here].mean())
             ends = exact_band(hits, count)
             holds = "yes" if ends[0] <= mean <= ends[1] else "no"
             cells = f"{count} | {mean:.3f} | {hits / count:.3f} | {ends[0]:.2f} to {ends[1]:.2f}"
-            rows.append(f"| {low:.1f} to {high:.1f} | {cells} | {holds} |")
+            rows.append(f"| {low:.2g} to {high:.2g} | {cells} | {holds} |")
     return rows
 
 
