@@ -4,6 +4,7 @@ import logging
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -156,8 +157,17 @@ def _stirs(
     viscosity = calibration.summary.best["viscosity"]
 
     def experiment(own: StirSimulator, noise: "AutoregressiveNoise", label: str):
+        @cache
+        def at(viscosity: float) -> "inference.criticism.Noise":
+            return with_model_error(noise, model_error(own, viscosity, clean))
+
         made = stir_experiment(own, noise, model_error(own, viscosity, clean), label)
-        return replace(made, identity=own.identity_with_effects)
+        return replace(
+            made,
+            identity=own.identity_with_effects,
+            # as the error follows the viscosity, a model is judged by that of its own liquid
+            noise_at=lambda theta: at(float(f"{theta['viscosity']:.2g}")),
+        )
 
     def held_out(recording: Recording) -> "inference.criticism.Experiment":
         own = stir_simulator([recording], stirring.setups[0].particles)

@@ -249,7 +249,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     extended = leading.hypothesis if leading else None
     left = []
     if extended is not None:
-        null = null_draws(extended, experiment.noise, np.random.default_rng(seed))
+        noise = experiment.at(extended.best).noise
+        null = null_draws(extended, noise, np.random.default_rng(seed))
         left = locate(extended, experiment.windows, null)
     return Criticism(
         verdict=verdict,
@@ -262,7 +263,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         after=tuple(left),
         suggestions=tuple(suggestions),
         untested=base.untested | _left_out(candidates),
-        experiment=experiment,
+        experiment=experiment.at((extended or base.hypothesis).best),
         units={name: one.unit for name, one in extensions.items()},
         tied=tuple(one.names for one in members if verdict.kind is not VerdictKind.AGREEMENT),
         probabilities=probability,
@@ -333,9 +334,12 @@ def _judged(
         there = np.isfinite(one.observed)
         neutral, made = before.signals[:, there], [runs.signals[:, there] for runs in after]
         acting = [k for k, runs in enumerate(after) if len(runs)]
-        evidence = predictive_gains(one, neutral, [made[k] for k in acting])
+        own = [one.at(model.best) for model in models]
+        evidence = predictive_gains(
+            [own[0], *(own[k + 1] for k in acting)], [neutral, *(made[k] for k in acting)]
+        )
         for k, gained in zip(acting, evidence, strict=True):
-            new = gap(one, neutral, made[k], seed)._replace(evidence=float(gained))
+            new = gap(own[k + 1], neutral, made[k], seed)._replace(evidence=float(gained))
             found[k] = replace(found[k], gaps=(*found[k].gaps, new))
         for k in set(range(len(found))) - set(acting):
             # what cannot be simulated there is not borne out there

@@ -1,8 +1,8 @@
 """Data of an experiment, the simulator that should explain them, and the effects it may lack."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +47,8 @@ class Experiment:
         identity: Names the simulator and its settings in the bank.
         label: A name for tables.
         windows: Where to look for disagreement.
+        noise_at: The noise at parameters, name -> value, where it depends on them, as that of a
+            simulator that errs more in some regimes; a model is judged by that at its own best.
 
     Raises:
         ValueError: `observed` has no finite value, or a window is of another shape.
@@ -58,6 +60,7 @@ class Experiment:
     identity: str = ""
     label: str = "data"
     windows: tuple[Window, ...] = ()
+    noise_at: Callable[[Mapping[str, float]], Noise] | None = None
 
     def __post_init__(self) -> None:
         check_function("simulate", self.simulate)
@@ -80,6 +83,10 @@ class Experiment:
     def shape(self) -> tuple[int, ...]:
         """Shape of the output."""
         return self.observed.shape
+
+    def at(self, theta: Mapping[str, float]) -> "Experiment":
+        """The same with the noise at these parameters."""
+        return self if self.noise_at is None else replace(self, noise=self.noise_at(theta))
 
     @property
     def measurement(self) -> Noise:

@@ -100,7 +100,7 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
     left = measures(observed - means[1:])[:, 0]
     sizes = np.sqrt(np.mean((observed - means) ** 2, axis=1))
     known = np.trace(experiment.measurement.covariance(at) + simulated) / len(observed)
-    gain = float(predictive_gains(experiment, before, [after])[0])
+    gain = float(predictive_gains([experiment, experiment], [before, after])[0])
     return Gap(
         label=experiment.label,
         before=float(sizes[0]),
@@ -115,22 +115,26 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
 
 
 @in_float64
-def predictive_gains(
-    experiment: Experiment, before: np.ndarray, afters: Sequence[np.ndarray]
-) -> np.ndarray:
-    """Log predictive densities of models less that of another one, runs [k, n] each.
+def predictive_gains(experiments: Sequence[Experiment], groups: Sequence[np.ndarray]) -> np.ndarray:
+    """Log predictive densities of models less that of the first, runs [k, n] each.
 
-    All have one covariance, so that they can be compared with one another.
+    What their runs differ by is pooled, so that they can be compared with one another.
+
+    Args:
+        experiments: The same held-out one, with each model's noise.
+        groups: Runs of each model.
     """
-    groups = [before, *afters]
-    observed = experiment.corrected[np.isfinite(experiment.observed)]
-    at, series = samples(experiment.observed), len(observed) >= MIN_LONG
+    seen = np.isfinite(experiments[0].observed)
+    at, series = samples(experiments[0].observed), int(seen.sum()) >= MIN_LONG
     fewer = 1.0 + 1.0 / min(map(len, groups))
     simulated = fewer * smooth_covariance(errors_of(groups), at, series)
-    rows = observed - np.stack([made.mean(0) for made in groups])
-    mean = experiment.noise.covariance(at) + simulated
-    density = error_sizes(experiment.noise, at).log_densities(rows, mean)
-    return density[1:] - density[0]
+    density = [
+        error_sizes(one.noise, at).log_densities(
+            (one.corrected[seen] - made.mean(0))[None], one.noise.covariance(at) + simulated
+        )[0]
+        for one, made in zip(experiments, groups, strict=True)
+    ]
+    return np.array(density[1:]) - density[0]
 
 
 def judged(

@@ -145,10 +145,12 @@ class Hypothesis:
 
     @in_float64
     def gain(self, base: "Hypothesis") -> float:
-        """Log likelihood beyond a base model's, under the covariances of that."""
-        rows = np.stack([self.difference, base.difference])
-        own, of_base = base.error_sizes.log_densities(rows, base.spread + base.noise)
-        return float(own - of_base)
+        """Log likelihood beyond a base model's; what simulator and emulator add counts alike."""
+        own, of_base = (
+            float(one.error_sizes.log_densities(one.difference[None], base.spread + one.noise)[0])
+            for one in (self, base)
+        )
+        return own - of_base
 
     @cached_property
     @in_float64
@@ -265,12 +267,13 @@ class ErrorSizes(NamedTuple):
 
     @in_float64
     def log_densities(self, rows: np.ndarray, mean: np.ndarray) -> np.ndarray:
-        """Log densities [n], up to a constant, of residuals [n, m] under these covariances."""
+        """Log densities [n], but for (2 pi)^(m/2), of residuals [n, m] under these covariances."""
         # the covariances of all sizes have the same generalised eigenvectors
         share, vectors = eigh(self.part, mean)
         scale = np.maximum(1.0 + np.outer(self.sizes - 1.0, share), LEAST_SCALE)
         squares = (rows @ vectors) ** 2
         each = -0.5 * (squares @ (1.0 / scale).T + np.log(scale).sum(1))
+        each += np.linalg.slogdet(vectors)[1]  # less half the log determinant of `mean`
         return np.asarray(logsumexp(each + self.log_weight, axis=1))
 
 

@@ -153,7 +153,7 @@ class ModelError:
         return positive_autocovariance(np.append(self.autocovariance, np.zeros(missing)))
 
 
-@lru_cache(maxsize=4)  # the data, those held out, and one that is left out
+@lru_cache(maxsize=16)  # of each regime: the data, those held out, and one that is left out
 @in_float64
 def _conditional(error: ModelError, channel: bytes, sample: bytes) -> tuple[np.ndarray, np.ndarray]:
     """A Gaussian's conditional, kept: all hypotheses of an experiment ask for the same."""

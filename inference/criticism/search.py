@@ -93,7 +93,7 @@ def examine(study: Study, earlier: Runs | None) -> Base:
     signatures = {
         name: signature(base, single, study.extensions[name]) for name, single in singles.items()
     }
-    signatures = scored_on_clean(base, study.experiment.noise, signatures)
+    signatures = scored_on_clean(base, study.experiment.at(base.best).noise, signatures)
     tested, null = study.check(base, signatures)
     return Base(
         hypothesis=base,

@@ -170,7 +170,11 @@ class Study:
     def hypothesis(self, names: tuple[str, ...], runs: Runs, within: PriorBox) -> Hypothesis:
         """The model in which the named effects act, fitted where it was simulated."""
         prior, data = extended(self.prior, self.extensions, names), self.experiment
-        return hypothesise(names, prior, runs, data.corrected, data.noise, within)
+        found = hypothesise(names, prior, runs, data.corrected, data.noise, within)
+        own = data.at(found.best)
+        if own.noise is data.noise:
+            return found
+        return hypothesise(names, prior, runs, own.corrected, own.noise, within)
 
     def points(self, box: PriorBox, names: tuple[str, ...], count: int) -> dict[str, np.ndarray]:
         """Parameters all over a box, name -> [count]."""
@@ -181,7 +185,7 @@ class Study:
     ) -> tuple[Check, np.ndarray]:
         """Its test, and residuals [m, n] of a right model."""
         rng = np.random.default_rng(self.seed)
-        null = null_draws(hypothesis, self.experiment.noise, rng)
+        null = null_draws(hypothesis, self.experiment.at(hypothesis.best).noise, rng)
         return check(hypothesis, signatures, null), null
 
 
