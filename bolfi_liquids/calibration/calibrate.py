@@ -30,7 +30,15 @@ from ..run.results import generations, versions
 from ..run.run import RUN_TOML, Run
 from ..run.simulations import warn_of_failures
 from ..simulators import StirSimulator, stir_simulator
-from .baseline import Baseline, CleanSource, Part, open_clean, parts_of, recording_of
+from .baseline import (
+    Baseline,
+    CleanSource,
+    Part,
+    open_clean,
+    parts_of,
+    prior_warnings,
+    recording_of,
+)
 from .engine_fit import (
     PREDICTIVE_DRAWS,
     THETA_STAR_REPLICATES,
@@ -149,7 +157,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         if table is not None:
             keep_pours(path, table, made_with)
             run.write_summary()
-        for notice in recording_warnings(opened):
+        for notice in (*recording_warnings(opened), *prior_warnings(given, prior)):
             logger.warning(notice)
         if run.result("calibrate") is None:
             _calibrate(run, settings, stirring, clean, compute, progress)
