@@ -31,8 +31,8 @@ class Gap(NamedTuple):
         p_value: Of what is left after, by its RMS and by its slow part (Bonferroni), all noise
             and the model error considered.
         lpd_gain: Log predictive density after less before.
-        evidence: The same under the covariance that all explanations share, by which they are
-            compared with one another.
+        evidence: The same difference under one covariance for all explanations, so that these can
+            be compared with one another.
     """
 
     label: str
@@ -118,9 +118,14 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
 def predictive_gains(
     experiment: Experiment, before: np.ndarray, afters: Sequence[np.ndarray]
 ) -> np.ndarray:
-    """Log predictive densities of models less that of another one, runs [k, n] each.
+    """Log predictive densities [models] of held-out data beyond that of the base model.
 
-    All have one covariance, so that they can be compared with one another.
+    All models have one covariance, so that they can be compared with one another.
+
+    Args:
+        experiment: The held-out one, of n values that are not NaN.
+        before: Runs of the base model [k, n].
+        afters: Runs of each other model [k, n].
     """
     groups = [before, *afters]
     observed = experiment.corrected[np.isfinite(experiment.observed)]
