@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .calibration.model_error import model_error, noise_beside
-from .calibration.stirs import camera_noise, sensor_noise, stir_experiment
+from .calibration.model_error import model_error
+from .calibration.stirs import camera_noise, sensor_noise, stir_experiment, with_model_error
 from .criticism.result import calibration_to_pour
 from .inputs.settings import CriticismSettings
 from .motions import FILE, Motion, family, keep_motion, planned
@@ -119,7 +119,7 @@ def _proposals(
         for signal in made.signals:
             swung = replace(plan.recordings[0], inclination=signal)
             error = model_error(StirSimulator((swung,), plan.setups), theta["viscosity"])
-            yield replace(proposal, noise=noise_beside(stirring, error))
+            yield replace(proposal, noise=with_model_error(noise, error))
 
 
 def _rivals(

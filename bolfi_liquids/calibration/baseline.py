@@ -16,7 +16,7 @@ from ..errors import Argument, InputError
 from ..files import existing_file, new_file
 from ..inputs.frame import recording_warnings
 from ..inputs.open import Source, open_recording, open_recordings
-from ..inputs.prior import check_prior, default_prior, describe_prior
+from ..inputs.prior import default_prior, describe_prior
 from ..inputs.recording import (
     PLANE_NAMES,
     UNITS,
@@ -43,6 +43,9 @@ logger = logging.getLogger(__name__)
 
 BANK = ".sqlite"
 """Ending of the simulations that are kept beside a baseline."""
+
+GROUP = "clean_"
+"""Start of a clean recording's group; its number follows."""
 
 FIX = "make it again: bolfi-liquids baseline RECORDING... --out FILE"
 
@@ -76,20 +79,25 @@ class Baseline:
         """Read a baseline.
 
         Raises:
-            InputError: It is damaged or another file, or another version of the fluid made it.
+            InputError: It is damaged or another file, or another version of the fluid or of the
+                engine made it.
         """
         path = existing_file(path)
         try:
             tree = read_result(path)
             made_from = json.loads(tree.attrs["made_from"])
-            model, groups = made_from["model"], tree.children.values()
-            clean = tuple(_read(group.to_dataset()) for group in groups)
-        except (OSError, ValueError, LookupError) as err:
+            settings = made_from["settings"]
+            _ = settings["particles"], settings["prior"]
+            made_by = {part: made_from[part] for part in generations()}
+            clean = tuple(_read(group.to_dataset(), path) for group in tree.children.values())
+        except (OSError, TypeError, ValueError, LookupError) as err:
             what = "is damaged, or was not made by `bolfi-liquids baseline`"
             raise InputError(what, where=str(path), fix=FIX) from err
-        if model != (now := generations()["model"]):
-            what = f"was made by version {model} of the fluid, which is now {now}"
-            raise InputError(what, where=str(path), fix=FIX)
+        for part, now in generations().items():
+            if made_by[part] != now:
+                of = "fluid" if part == "model" else part
+                what = f"was made by version {made_by[part]} of the {of}, which is now {now}"
+                raise InputError(what, where=str(path), fix=FIX)
         return cls(path, clean, made_from)
 
 
@@ -100,12 +108,11 @@ Part = Recording | Clean
 """A clean recording, whose residual has to be learned or is known."""
 
 
-def learn_baseline(  # noqa: PLR0913  as other steps are called
+def learn_baseline(
     recordings: Source | Sequence[Source],
     *,
     out: str | Path,
     particles: int = BaselineSettings.particles,
-    prior: "Prior | None" = None,
     executor: "Workers | None" = None,
     timeout: float | None = None,
     progress: bool = True,
@@ -114,19 +121,19 @@ def learn_baseline(  # noqa: PLR0913  as other steps are called
 
     Simulations are kept beside the file, under its name with the ending `.sqlite`: a call that was
     interrupted, or that has further recordings, repeats none of them. The same call on a finished
-    file only opens it.
+    file only opens it; a damaged baseline, and one of another version, is made anew. Liquids have
+    the default prior.
 
     Args:
         recordings: Clean ones, in which no effect is believed to be missing, of any liquids.
         out: The file, in `.nc`.
         particles: As given to `calibrate`.
-        prior: Of the liquids; None is that of `calibrate`.
         executor, timeout: See `calibrate`.
         progress: Whether to show phases on stderr.
 
     Raises:
-        InputError: A recording cannot be used, or is of another rig than the first; or the prior, a
-            setting, `timeout` or `out` cannot be used.
+        InputError: A recording cannot be used, or is of another rig than the first; or a setting,
+            `timeout` or `out` cannot be used, or `out` is a file but no baseline.
         ValueError, ImportError, ConnectionError: `executor` cannot be used.
         RuntimeError: Simulations failed; the message says how.
     """
@@ -135,21 +142,21 @@ def learn_baseline(  # noqa: PLR0913  as other steps are called
     from ..inference import SimulationBank
 
     settings, path = BaselineSettings(particles), new_file(out, Argument("out"), suffix=".nc")
+    held = _held(path)
     clean = list({one.hash: one for one in open_recordings(recordings)}.values())
     if not clean:
         raise InputError("no recording given", where="recordings", fix="give at least one")
     check_beside(stir_simulator(clean[:1], particles), clean[1:], "baseline")
     for one in clean:
         camera_noise([one])  # refuses one that rests too shortly
-    prior = default_prior() if prior is None else prior
-    check_prior(prior)
+    prior = default_prior()
     made_from = {
         "recordings": {one.hash: one.path.name for one in clean},
         "settings": asdict(settings) | {"prior": describe_prior(prior)},
         **generations(),
     }
     wanted = Baseline(path, (), made_from)
-    if path.exists() and is_result(path) and (held := Baseline.open(path)).hash == wanted.hash:
+    if held and held.hash == wanted.hash:
         return held
     for notice in recording_warnings(clean):
         logger.warning(notice)
@@ -160,11 +167,39 @@ def learn_baseline(  # noqa: PLR0913  as other steps are called
     ):
         own = replace(compute, batch=CriticismSettings.batch, bank=bank)
         learned = clean_residuals(clean, particles, prior, own, report)
-    groups = {f"clean_{at}": _dataset(one) for at, one in enumerate(learned, start=1)}
+    groups = {f"{GROUP}{at}": _dataset(one) for at, one in enumerate(learned, start=1)}
     tree = DataTree.from_dict(groups)
     tree.attrs["made_from"] = json.dumps(made_from)
     write_result(tree, path)
     return Baseline(path, tuple(learned), made_from)
+
+
+def _held(path: Path) -> Baseline | None:
+    """The baseline in a file; None where there is none, or it has to be made anew.
+
+    Raises:
+        InputError: The file is something else.
+    """
+    if not path.exists():
+        return None
+    if not _was_baseline(path):
+        fix = "choose another name, or move that file away"
+        raise InputError("exists already, and is no baseline", where=str(path), fix=fix)
+    try:
+        return Baseline.open(path)
+    except InputError:
+        return None
+
+
+def _was_baseline(path: Path) -> bool:
+    """Whether `learn_baseline` wrote a file, or any command one that is damaged."""
+    if not is_result(path):
+        return False
+    try:
+        groups = read_result(path).children
+    except (OSError, ValueError):
+        return True
+    return bool(groups) and all(name.startswith(GROUP) for name in groups)
 
 
 def open_clean(sources: CleanSource | Iterable[CleanSource]) -> list[Recording | Baseline]:
@@ -217,6 +252,17 @@ def parts_of(
     return [part for key, part in parts.items() if key not in digests], names
 
 
+def prior_warnings(given: Sequence[Recording | Baseline], prior: "Prior") -> list[str]:
+    """A warning for each baseline whose liquids had another prior than a run's."""
+    described = json.loads(json.dumps(describe_prior(prior)))
+    return [
+        f"{one.path}: its liquids had another prior than the run's; give its recordings instead to "
+        "learn them with the run's"
+        for one in given
+        if isinstance(one, Baseline) and one.made_from["settings"]["prior"] != described
+    ]
+
+
 def recording_of(part: Part) -> Recording:
     """The recording itself."""
     return part if isinstance(part, Recording) else part.recording
@@ -234,8 +280,11 @@ def _dataset(clean: Clean) -> "Dataset":
     )
 
 
-def _read(group: "Dataset") -> Clean:
-    """The clean recording of a group, of which nothing was simulated here."""
-    named = Path(group.attrs.pop("file")), group.attrs.pop("sha256")
+def _read(group: "Dataset", path: Path) -> Clean:
+    """The clean recording of a group, of which nothing was simulated here.
+
+    Its path is one within the baseline at `path`: messages name the file that was given, too.
+    """
+    named = path / group.attrs.pop("file"), group.attrs.pop("sha256")
     recording = replace(as_recording(group, named[0], b""), hash=named[1])
     return Clean(recording, group["residual"].to_numpy(), float(group["viscosity"]), 0)

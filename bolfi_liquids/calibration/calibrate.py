@@ -30,7 +30,15 @@ from ..run.results import generations, versions
 from ..run.run import RUN_TOML, Run
 from ..run.simulations import warn_of_failures
 from ..simulators import StirSimulator, stir_simulator
-from .baseline import Baseline, CleanSource, Part, open_clean, parts_of, recording_of
+from .baseline import (
+    Baseline,
+    CleanSource,
+    Part,
+    open_clean,
+    parts_of,
+    prior_warnings,
+    recording_of,
+)
 from .engine_fit import (
     PREDICTIVE_DRAWS,
     THETA_STAR_REPLICATES,
@@ -43,10 +51,9 @@ from .model_error import (
     check_beside,
     clean_residuals,
     model_error,
-    noise_beside,
 )
 from .result import Calibration
-from .stirs import camera_noise
+from .stirs import camera_noise, sensor_noise, with_model_error
 from .summary import CalibrationSummary
 
 if TYPE_CHECKING:
@@ -149,7 +156,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         if table is not None:
             keep_pours(path, table, made_with)
             run.write_summary()
-        for notice in recording_warnings(opened):
+        for notice in (*recording_warnings(opened), *prior_warnings(given, prior)):
             logger.warning(notice)
         if run.result("calibrate") is None:
             _calibrate(run, settings, stirring, clean, compute, progress)
@@ -184,6 +191,9 @@ def _calibrate(
     progress: bool,
 ) -> None:
     """Search, confirm, judge, and keep the result in the run."""
+    from ..inference.criticism import KnownNoise
+
+    cameras = KnownNoise(sensor_noise(stirring.observed))
     unknown = [one for one in clean if isinstance(one, Recording)]
     needed = settings.budget + CLEAN_RUNS * len(unknown)
     needed += PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
@@ -198,7 +208,7 @@ def _calibrate(
         if settings.surrogate == "signal":
             # beside the largest error the search does not settle on one liquid too early
             error = model_error(stirring, 0.0)
-            noise = noise_beside(stirring, error)
+            noise = with_model_error(cameras, error)
         fit = fit_recordings(
             stirring,
             stirring.observed,
@@ -219,7 +229,7 @@ def _calibrate(
                 report=lambda _phase, finished, _total: advance(finished),
             )
             error = model_error(stirring, fit.best["viscosity"], learned)
-            noise = noise_beside(stirring, error)
+            noise = with_model_error(cameras, error)
         fit = confirmed(fit, noise, stirring, compute, settings, advance)
         warn_of_failures(fit.history.why.tolist(), compute.timeout)
         sampled = fit.sample(

@@ -25,7 +25,7 @@ from .summary import unexplained
 
 if TYPE_CHECKING:
     from ..inference import Prior
-    from ..inference.criticism import ModelError, Report, SumOfNoises
+    from ..inference.criticism import ModelError, Report
     from ..inference.simulations import Compute
 
 STARTING_RUNS = 4  # of each clean recording, all over the prior; as many follow near the best
@@ -234,10 +234,3 @@ def regime_distance(one: float, other: float, least: float) -> float:
     """
     ratio = max(one, least) / max(other, least)
     return float(np.log(ratio) / np.log(VISCOSITY_FACTOR))
-
-
-def noise_beside(stirring: StirSimulator, error: "ModelError") -> "SumOfNoises":
-    """The cameras' noise and the simulator's error."""
-    from ..inference.criticism import KnownNoise, SumOfNoises
-
-    return SumOfNoises((KnownNoise(sensor_noise(stirring.observed)), error))

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         Extension,
         ModelError,
         Noise,
+        SumOfNoises,
         Window,
     )
 
@@ -102,18 +103,18 @@ def stir_experiment(
     return Experiment(
         stirring.batched,
         stirring.observed,
-        with_model_error(cameras, usual),
+        cameras if usual is None else with_model_error(cameras, usual),
         stirring.identity,
         label,
         windows(stirring),
     )
 
 
-def with_model_error(cameras: "AutoregressiveNoise", usual: "ModelError | None") -> "Noise":
-    """The cameras' noise and, where it is known, the simulator's usual residual."""
+def with_model_error(cameras: "Noise", error: "ModelError") -> "SumOfNoises":
+    """The cameras' noise and the simulator's error."""
     from ..inference.criticism import SumOfNoises
 
-    return cameras if usual is None else SumOfNoises((cameras, usual))
+    return SumOfNoises((cameras, error))
 
 
 def windows(stirring: StirSimulator) -> tuple["Window", ...]:

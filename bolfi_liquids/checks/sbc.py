@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.model_error import model_error
+from ..calibration.stirs import with_model_error
 from ..drawing import new_figure, styled, write_figure
 from ..errors import Argument
 from ..files import given_path
@@ -138,14 +139,14 @@ class SbcStudy:
     def replicates(self, name: Surrogate) -> "Replicates":
         """Calibrations of stirs whose truths are known, by one of `SURROGATES`."""
         from .. import inference
-        from ..inference.criticism import KnownNoise, SumOfNoises
+        from ..inference.criticism import KnownNoise
 
         calibration = self.settings.calibration(name)
         noise: Any = KnownNoise(float(np.radians(self.settings.noise_deg)))
         pipeline: Any = Calibrate(self.stirring, self.prior, calibration, self.compute.timeout)
         if name == "signal":
             # an error of the simulator is observed, and allowed for, as `calibrate` does
-            noise = SumOfNoises((noise, model_error(self.stirring, 0.0)))
+            noise = with_model_error(noise, model_error(self.stirring, 0.0))
             shared = self.stirs_everywhere()
             pipeline = FromBank(self.stirring, self.prior, *shared, calibration, noise)
         return inference.replicates(

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..calibration.baseline import CleanSource, open_clean
+from ..calibration.baseline import CleanSource, open_clean, prior_warnings
 from ..calibration.model_error import Clean, clean_residuals, model_error
 from ..calibration.result import Calibration
 from ..calibration.stirs import (
@@ -101,7 +101,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         base = Calibration.of(run)
         poured = pours, held_out_pours
         inputs = open_inputs(base, settings, kept_back, clean, poured, cups)
-        for notice in recording_warnings(inputs.compared):
+        warnings = recording_warnings(inputs.compared) + prior_warnings(clean, base.prior)
+        for notice in warnings:
             logger.warning(notice)
         for name in inputs.left_out:
             logger.warning("baseline %s: is criticised or held out, so it is not counted", name)

@@ -52,8 +52,8 @@ class Criticism(Displayed):
         experiment: The data, their noise and the simulator.
         units: Of the effects' coefficients.
         tied: Names of each explanation that remains, best first.
-        sensitivities: Of each effect that was simulated: which sizes the data would show, and which
-            they may hide.
+        sensitivities: Sizes that the data would show, and sizes that they may hide, in the unit of
+            the coefficient (`units`), for each effect that was simulated.
         probabilities: Of "none", of each explanation that was fitted, and of "none of these"; see
             `verdict`.
         simulations: Runs that were asked for, those found in the bank included.
@@ -132,8 +132,11 @@ class Criticism(Displayed):
 
     @property
     def isolability(self) -> np.ndarray:
-        """Signal-to-noise ratio of each effect, of its typical size, that no size of the other
-        effect absorbs [e, e]; below about 3 the data do not tell the two apart."""
+        """Signal-to-noise ratio of each effect that no size of another effect absorbs [e, e].
+
+        Rows are effects of their typical size, columns the others. Below about 3 the data do not
+        distinguish the two.
+        """
         side = np.array([of.side for of in self.base.signatures.values()])
         snr = np.array([of.snr for of in self.base.signatures.values()])
         # of two effects that act to one side each, one may lie where the other cannot
@@ -167,12 +170,14 @@ def criticise(  # noqa: PLR0913  the one call that most users make
 ) -> Criticism:
     """Test a simulator against data, and look for what it lacks.
 
-    The base model is fitted and its residual tested (`misfit`). If it is rejected, every effect
-    is fitted together with the base parameters; the best are simulated where they fit best,
-    fitted again, and must pass the test that the base model failed. Those that no test tells
-    apart are a tie; where no one passes, pairs are tried. On held-out data an explanation must
-    leave no more than noise, explain most of the gap, and predict better than the base model, or
-    it is withdrawn; how much better also tells explanations apart.
+    The base model is fitted and its residual tested (`misfit`). If its p-value is below `level`,
+    every effect is fitted together with the base parameters. The best are simulated where they fit
+    best and fitted again; where none of them passes the test that the base model failed, pairs are
+    tried. What passes predicts the held-out data. All data together give each explanation, "none"
+    and "none of these" a probability (`verdict`). The verdict names the smallest set of
+    explanations that holds the right one with a probability of 0.9: one is an effect, several are
+    a tie. The most probable must have passed; on held-out data it must leave no more than noise,
+    explain most of the gap and predict better than the base model.
 
     All runs are kept in the bank under seeds that derive from one: the same call repeats
     nothing that was finished and concludes the same.
@@ -185,7 +190,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         held_out: Experiments that nothing is fitted to.
         proposals: Experiments that could be made next.
         accept: Effects to accept, whatever the verdict; None accepts what the verdict names.
-        level: p-value below which the base model is rejected.
+        level: p-value of the base model below which explanations are looked for.
         plan: How many runs each step may make.
         seed: Fixes everything random.
         report: Called with the phase, the number of simulations finished in it since the last
@@ -278,8 +283,12 @@ def criticise(  # noqa: PLR0913  the one call that most users make
 def _explanations(
     study: Study, base: Base, accept: Sequence[str] | None, held_out: Sequence[Experiment]
 ) -> tuple[list[Candidate], Candidate | None]:
-    """Fit explanations, and test those that passed on the held-out data. The one by the effects to
-    accept, if there are any, is refitted and tested besides: it changes nothing of the others."""
+    """Fit explanations, and test those that passed on the held-out data.
+
+    Returns:
+        All of them; and, if there are effects to accept, the explanation by these, which is
+        refitted and tested besides and changes none of the others.
+    """
     sought, asked = explain(study, base, accept)
     chosen = [one for one in sought if one.accepted]
     judged = _judged(study, base, chosen, held_out)

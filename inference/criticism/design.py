@@ -19,7 +19,7 @@ OUTCOMES = 4000  # of each rival, of which the expected error is the mean
 
 
 class Rival(NamedTuple):
-    """An explanation among which an experiment should decide.
+    """One of the explanations that an experiment should distinguish.
 
     Attributes:
         theta: Draws of its parameters, the most probable first, name -> [n].
@@ -31,15 +31,16 @@ class Rival(NamedTuple):
 
 
 class Suggestion(NamedTuple):
-    """What an experiment is expected to tell.
+    """A proposed experiment, and the expected rate of wrong names after it.
 
     Attributes:
-        label: The experiment's.
+        label: Label of the proposal.
         between: The two rivals that it separates least well.
-        snr: Signal-to-noise ratio of their difference.
-        error: Expected rate of wrong names after it, if the most probable rival is named.
-        before: The same rate without it.
-        cost: The experiment's.
+        snr: Signal-to-noise ratio of the difference between these two.
+        error: Expected probability, in [0, 1], that the most probable rival is wrong after the
+            experiment.
+        before: The same probability without the experiment.
+        cost: Cost of the proposal, in the proposal's unit.
     """
 
     label: str
@@ -53,7 +54,10 @@ class Suggestion(NamedTuple):
 def rivals_of(
     candidates: Sequence[Candidate], probability: Mapping[str, float], seed: int
 ) -> dict[str, Rival]:
-    """Explanations as rivals, by name, as probable as they are; where none is, all are alike."""
+    """Turn explanations into rivals by label.
+
+    Their probabilities are scaled to the sum 1, and are equal where all of them are 0.
+    """
     weights = np.array([probability[label(one.names)] for one in candidates])
     if not weights.sum() > 0.0:
         weights = np.ones(len(candidates))
@@ -108,11 +112,13 @@ def _simulated(
 
 @in_float64
 def assess(proposal: Proposal, rivals: Mapping[str, Rival], runs: np.ndarray) -> Suggestion:
-    """What a proposal is expected to tell, of runs [rivals, n, values]; the k-th of each rival
-    have one seed.
+    """Estimate how well a proposal separates rivals.
 
-    The rivals' outputs are taken for Gaussian with one covariance: the noise, and what the runs
-    of a rival differ by, which its free parameters can absorb.
+    The rivals' outputs are Gaussian with one covariance: that of the noise, and that between the
+    runs of a rival, which its free parameters can absorb.
+
+    Args:
+        runs: Outputs [rivals, n, values]; the k-th runs of all rivals have one seed.
     """
     own, factor, span = judged(proposal.noise, np.zeros(proposal.shape), list(runs))
     noise = np.trace(span.T @ np.linalg.solve(factor, np.linalg.solve(factor, own).T) @ span)

@@ -118,7 +118,7 @@ class Proposal:
         simulate, noise, identity: As of an `Experiment`.
         shape: Of its output.
         label: What to do, for a person.
-        cost: Of making it, in any unit.
+        cost: Cost of the experiment, in any unit that all proposals share.
 
     Raises:
         ValueError: a field is of another kind, or the cost is negative.

@@ -31,8 +31,8 @@ class Gap(NamedTuple):
         p_value: Of what is left after, by its RMS and by its slow part (Bonferroni), all noise
             and the model error considered.
         lpd_gain: Log predictive density after less before.
-        evidence: The same under the covariance that all explanations share, by which they are
-            compared with one another.
+        evidence: The same difference under one covariance for all explanations, so that these can
+            be compared with one another.
     """
 
     label: str

@@ -50,7 +50,7 @@ class Hypothesis:
         latent: Covariance of what the emulator does not know [m, m].
         own: Covariance of the simulator's own noise [m, m].
         noise: Covariance of the noise between the simulator and the data [m, m].
-        error_sizes: Of the model error in it.
+        error_sizes: Sizes that the model error in that noise may have.
     """
 
     names: tuple[str, ...]
@@ -112,7 +112,7 @@ class Hypothesis:
     @cached_property
     @in_float64
     def posterior_covariance(self) -> np.ndarray:
-        """Of the parameters in prior quantiles, by Laplace's approximation [d, d]."""
+        """Covariance of the parameters in prior quantiles, by Laplace's approximation [d, d]."""
         information = self.slopes.T @ self.slopes + PRIOR_PRECISION * np.eye(len(self.u))
         return np.linalg.inv(information)
 
@@ -252,9 +252,10 @@ class ErrorSizes(NamedTuple):
     Few clean data tell how large it is; the residual of these data tells more.
 
     Attributes:
-        part: Its covariance [m, m] at size 1, part of the noise's; zero where there is no error.
-        sizes: Of its variance, in units of `part` [s].
-        log_weight: Of each size [s].
+        part: Covariance of the model error at size 1 [m, m], a part of the noise's; zero where
+            there is no model error.
+        sizes: Variances of the model error in units of `part` [s].
+        log_weight: Log prior weights of the sizes [s].
     """
 
     part: np.ndarray
@@ -262,12 +263,15 @@ class ErrorSizes(NamedTuple):
     log_weight: np.ndarray
 
     def covariances(self, mean: np.ndarray) -> list[np.ndarray]:
-        """Of the noise [m, m] of each size, that of size 1 being `mean`."""
+        """Covariances of the noise, [m, m] for each size; that of size 1 is `mean` [m, m]."""
         return [mean + (size - 1.0) * self.part for size in self.sizes]
 
     @in_float64
     def log_densities(self, rows: np.ndarray, mean: np.ndarray) -> np.ndarray:
-        """Log densities [n], but for (2 pi)^(m/2), of residuals [n, m] under these covariances."""
+        """Log densities [n], but for (2 pi)^(m/2), of residuals `rows` [n, m], averaged over the sizes.
+
+        `mean` is the covariance of the noise at size 1 [m, m].
+        """
         # the covariances of all sizes have the same generalised eigenvectors
         share, vectors = eigh(self.part, mean)
         scale = np.maximum(1.0 + np.outer(self.sizes - 1.0, share), LEAST_SCALE)
@@ -278,7 +282,7 @@ class ErrorSizes(NamedTuple):
 
 
 def error_sizes(noise: Noise, at: Layout) -> ErrorSizes:
-    """Of the model error in the noise of m samples."""
+    """Sizes of the model error in the noise of m samples."""
     error = split_noise(noise)[1]
     if error is None:
         return ErrorSizes(np.zeros((len(at.sample),) * 2), np.ones(1), np.zeros(1))

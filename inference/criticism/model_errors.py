@@ -88,8 +88,8 @@ class ModelError:
 
     Attributes:
         autocovariance: Of clean residuals by lag in samples, shape [lags]; zero beyond.
-        freedom: Weight of the clean data: the size is known as well as a variance from so many
-            numbers, but never less than from MIN_FREEDOM.
+        freedom: Of the size: it is known as well as a variance from so many numbers, but never less
+            than from MIN_FREEDOM.
         clean: What it was learned from.
         known: What was known of it without them, if anything.
     """
@@ -207,18 +207,27 @@ def learned_model_error(clean: Sequence[CleanData], known: ModelError | None = N
     learned from the nearest. Where its errors are known to differ between regimes, give each
     residual and its noise times the error known here over the one known there.
 
+    Sums of squares of both sources are pooled: their size has the inverse-gamma distribution of
+    all numbers. Where their variances differ by more than their freedoms allow, the pooled freedom
+    is divided by Birge's ratio, the square of that difference over its expectation (Birge 1932).
+
     Args:
         clean: In which no effect is believed to be missing.
         known: What is known of the error without them, see `model_error`: it counts as clean data
-            of this very regime, `known.freedom` of them.
+            of this very regime, `known.freedom` of them. It has no clean data of its own.
 
     Raises:
-        ValueError: there are none and nothing is known, they differ in their number of channels,
-            or those of the same experiment in their shape.
+        ValueError: there are none and nothing is known, `known` was learned from clean data, they
+            differ in their number of channels, or those of the same experiment in their shape.
     """
     for one in clean:
         check_kind("each of clean", one, CleanData)
     check_kind("known", known, ModelError | None)
+    if known is not None and known.clean:
+        raise ValueError(
+            "known must come from `model_error`, got one that was learned from clean data; "
+            "give these in clean instead"
+        )
     if known is not None and not clean:
         return known
     shapes = [one.residual.shape for one in clean]
@@ -234,10 +243,25 @@ def learned_model_error(clean: Sequence[CleanData], known: ModelError | None = N
         _autocovariance(one.residual, lags) - _expected_of(one.noise, len(one.residual), lags)
         for one in clean
     ]
-    weights = [*_weights(clean, known), 0.0 if known is None else known.freedom]
-    each.append(np.pad(before, (0, lags - len(before))))
-    mean = np.average(each, axis=0, weights=weights)
-    return ModelError(positive_autocovariance(mean), float(np.sum(weights)), tuple(clean), known)
+    weights = _weights(clean, known)
+    mean, freedom = np.average(each, axis=0, weights=weights), float(np.sum(weights))
+    if known is not None:
+        prior = np.pad(before, (0, lags - len(before)))
+        mean, freedom = _pooled(prior, known.freedom, mean, freedom)
+    return ModelError(positive_autocovariance(mean), freedom, tuple(clean), known)
+
+
+def _pooled(
+    one: np.ndarray, freedom: float, other: np.ndarray, other_freedom: float
+) -> tuple[np.ndarray, float]:
+    """Autocovariance [lags] of two sources, and its freedom."""
+    both = freedom + other_freedom
+    mean = (freedom * one + other_freedom * other) / both
+    if not mean[0] > 0.0:
+        return mean, both
+    # a variance v of n numbers has the variance 2 v^2 / n
+    expected = 2.0 * mean[0] ** 2 * (1.0 / freedom + 1.0 / other_freedom)
+    return mean, both / max((one[0] - other[0]) ** 2 / expected, 1.0)
 
 
 def model_error(size: float, correlation: ArrayLike, freedom: float = KNOWN_FREEDOM) -> ModelError:

@@ -20,12 +20,12 @@ GRID = 2000  # prior quantiles of which a limit is taken
 
 
 class Sensitivity(NamedTuple):
-    """Sizes of one effect in these data, as distances of its coefficient from neutral.
+    """Sizes of one effect: distances of its coefficient from neutral, in the coefficient's unit.
 
     Attributes:
-        smallest: Found with the probability `POWER`, whatever its sign; NaN if no size that the
-            prior allows is.
-        limit: Not exceeded with the probability `LIMIT`, by the model in which it acts alone.
+        smallest: Smallest size that these data reveal with the probability `POWER`, whatever its
+            sign; NaN if they reveal no size that the prior allows.
+        limit: Size that the effect does not exceed with the probability `LIMIT`, if it acts alone.
     """
 
     smallest: float
@@ -36,7 +36,7 @@ class Sensitivity(NamedTuple):
 def sensitivity(
     base: Hypothesis, single: Hypothesis, extension: Extension, effects: int
 ) -> Sensitivity:
-    """Sizes of the effect by which `single` goes beyond `base`, one of so many known effects.
+    """Sizes of the effect by which `single` goes beyond `base`; there are `effects` known effects.
 
     An effect is found if it is more probable than "none": its likelihood at its best exceeds that
     of the base model by the odds of their priors, and by the share of its prior that explains the

@@ -34,7 +34,7 @@ P_VALUE_STEP = 3.0 / (REPLICATES + 1.0)  # the smallest of a test that looks at 
 
 @dataclass(frozen=True)
 class Priors:
-    """Probabilities before the data; what they are of shares them evenly.
+    """Probabilities before the data; all explanations of a kind are equally probable.
 
     Attributes:
         none: Nothing is missing.
@@ -48,7 +48,7 @@ class Priors:
     other: float = 0.1
 
     def share(self, acting: int, effects: int) -> float:
-        """Of one explanation by so many of the known effects."""
+        """Prior probability of one explanation by `acting` of `effects` known effects."""
         return (self.one if acting == 1 else self.two) / comb(effects, acting)
 
 
@@ -62,7 +62,7 @@ class Candidate:
     Attributes:
         hypothesis: The extended model.
         check: Its own test.
-        gain: Log likelihood beyond the base model's, in the base model's metric.
+        gain: Log likelihood beyond the base model's, under the base model's covariances.
         occam: Log of the share of the coefficients' prior that explains the data as well.
         refitted: Whether runs near its best parameters were made for it; what was not is not
             accepted.
@@ -125,7 +125,8 @@ class Verdict:
             known effect explains it.
         effects: Their names.
         p_value: Of the base model.
-        probability: That it is right; of a tie, that the right explanation is among those named.
+        probability: Probability that this conclusion is right; of a tie, that the right explanation
+            is among those named.
         reason: The conclusion in a sentence.
     """
 
@@ -147,10 +148,10 @@ def near_best(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
 
 
 def probabilities(base: Check, candidates: Sequence[Candidate], effects: int) -> dict[str, float]:
-    """Probability of "none", of each explanation and of "none of these".
+    """Probability of "none", of each explanation and of "none of these"; they sum to 1.
 
-    What passes but was not refitted, and what cannot be simulated for the held-out data, counts as
-    none of these.
+    An explanation that passes but was not refitted, or that cannot be simulated for the held-out
+    data, adds to "none of these".
 
     Args:
         base: Test of the base model, "none".
@@ -174,8 +175,10 @@ def probabilities(base: Check, candidates: Sequence[Candidate], effects: int) ->
 
 
 def _fit_ratio(p_values: Sequence[float]) -> float:
-    """Probability of the smallest of several p-values under a right explanation over that under a
-    wrong one, within the step of the bootstrap in which it lies."""
+    """Bayes factor of a right over a wrong explanation, of the smallest of its p-values.
+
+    The bootstrap has finite steps, so both probabilities are those of a step.
+    """
     step = P_VALUE_STEP * len(p_values)
     p = float(np.clip(len(p_values) * min(p_values), step, 1.0))
     return step / (p**WRONG_P - max(p - step, 0.0) ** WRONG_P)
@@ -187,17 +190,19 @@ def label(names: Sequence[str]) -> str:
 
 
 def credible(probability: Mapping[str, float]) -> list[str]:
-    """The smallest set of explanations that holds the right one with the probability `CREDIBLE`,
-    best first."""
+    """Labels of the smallest set that holds the right explanation with the probability `CREDIBLE`,
+    most probable first."""
     ordered = sorted(probability, key=lambda name: -probability[name])
     reached = np.cumsum([probability[name] for name in ordered])
     return ordered[: 1 + int(np.searchsorted(reached, CREDIBLE - 1e-12))]
 
 
 def remaining(probability: Mapping[str, float], candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The credible explanations, best first; none where the model may lack nothing or something
-    else, where the best did not pass, and where one alone is left of which the held-out data show
-    nothing."""
+    """The credible explanations, most probable first.
+
+    There are none where "none" or "none of these" is credible, where the most probable explanation
+    was not accepted, or where one alone is left and the held-out data show no gap.
+    """
     by_label = {label(one.names): one for one in candidates}
     found = credible(probability)
     if not set(found) <= by_label.keys() or not by_label[found[0]].accepted:
@@ -212,7 +217,14 @@ def conclude(
     probability: Mapping[str, float],
     level: float = REJECTION_LEVEL,
 ) -> Verdict:
-    """From the base model's test and the probabilities of explanations."""
+    """Conclude from the base model's test and the probabilities of explanations.
+
+    Args:
+        base: Test of the base model.
+        candidates: Explanations that were looked for.
+        probability: See `probabilities`.
+        level: p-value below which the model and the data may differ.
+    """
     p, members = base.p_value, remaining(probability, candidates)
     if p >= level or credible(probability)[0] == NONE:
         lacks_nothing = probability[NONE]

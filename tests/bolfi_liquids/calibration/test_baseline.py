@@ -3,20 +3,24 @@
 import json
 import math
 import re
+import shlex
+import shutil
 
 import numpy as np
+import numpyro.distributions as dist
 import pytest
 import xarray as xr
-from bolfi_liquids.inference import SimulationBank
+from bolfi_liquids.inference import Prior, SimulationBank
 from bolfi_liquids.inference.simulations import Compute
 from typer.testing import CliRunner
 
 import bolfi_liquids as bl
-from bolfi_liquids.calibration.baseline import open_clean, parts_of, recording_of
+from bolfi_liquids.calibration.baseline import open_clean, parts_of, prior_warnings, recording_of
 from bolfi_liquids.calibration.model_error import CLEAN_RUNS, Clean, clean_residuals
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.criticism.inputs import open_inputs
 from bolfi_liquids.guide import read_page
+from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.inputs.settings import CriticismSettings
 from bolfi_liquids.run.results import read_result, write_result
 from bolfi_liquids.wording import degrees
@@ -123,9 +127,9 @@ def test_a_baseline_that_does_not_fit_is_refused_by_its_file(
 ):
     damaged = tmp_path / "damaged.nc"
     damaged.write_bytes(b"x" + baseline.path.read_bytes()[1:])
-    posterior = calibration.path / "posterior.nc"
-    other_model = changed(baseline, tmp_path / "model.nc", model="0")
-    for path in (damaged, posterior, other_model):
+    others = {"model": "0", "engine": "0", "settings": {}}
+    other = [changed(baseline, tmp_path / f"{name}.nc", **{name: others[name]}) for name in others]
+    for path in (damaged, calibration.path / "posterior.nc", *other):
         with pytest.raises(bl.InputError) as refused:
             open_clean([clean[0], path])
         assert str(path) in refused.value.where
@@ -142,6 +146,61 @@ def test_a_baseline_that_does_not_fit_is_refused_by_its_file(
         assert "finer.nc" in refused.value.where
 
 
+def test_a_recording_within_a_baseline_is_refused_by_both_files(
+    calibration, baseline, clean, tmp_path
+):
+    wide = read_result(baseline.path)
+    wide["clean_2"].attrs["cup_radius"] = 0.05
+    write_result(wide, tmp_path / "wide.nc")
+    given = open_clean(tmp_path / "wide.nc")
+    for call in (
+        lambda: bl.calibrate(
+            clean[0], baseline=given, particles=PARTICLES, out=tmp_path / "r", progress=False
+        ),
+        lambda: open_inputs(calibration, CriticismSettings(), [], given),
+    ):
+        with pytest.raises(bl.InputError, match="cup_radius") as refused:
+            call()
+        assert "wide.nc" in refused.value.where and "b.nc" in refused.value.where
+
+
+@pytest.mark.parametrize("fault", ["damaged", "model", "engine"])
+def test_a_baseline_that_is_refused_is_made_again_over_it(clean, baseline, tmp_path, fault):
+    """The cure of the refusal, followed by its words."""
+    out = tmp_path / "rig.nc"
+    shutil.copy(baseline.path.with_suffix(".sqlite"), out.with_suffix(".sqlite"))
+    if fault == "damaged":
+        out.write_bytes(b"x" + baseline.path.read_bytes()[1:])
+    else:
+        changed(baseline, out, **{fault: "0"})
+    with pytest.raises(bl.InputError) as refused:
+        bl.Baseline.open(out)
+    typed = shlex.split(refused.value.fix.split("bolfi-liquids ", 1)[1])
+    given = {"RECORDING...": list(map(str, clean)), "FILE": [str(out)]}
+    words = [word for one in typed for word in given.get(one, [one])]
+    result = CliRunner().invoke(app, [*words, "--particles", str(PARTICLES)])
+    assert result.exit_code == 0
+    assert bl.Baseline.open(out).hash == baseline.hash
+
+
+def test_no_file_but_a_baseline_is_overwritten(calibration, clean, tmp_path):
+    posterior = shutil.copy(calibration.path / "posterior.nc", tmp_path / "posterior.nc")
+    for out in (shutil.copy(clean[1], tmp_path / "b.nc"), posterior):
+        before = out.read_bytes()
+        with pytest.raises(bl.InputError) as refused:
+            bl.learn_baseline(clean[0], out=out, particles=PARTICLES, progress=False)
+        assert out.name in refused.value.where and out.read_bytes() == before
+        assert not out.with_suffix(".sqlite").exists()
+
+
+def test_another_prior_than_the_baselines_is_told(baseline, clean):
+    given = [bl.open_recording(clean[0]), baseline]
+    assert not prior_warnings(given, default_prior())
+    narrow = {**default_prior().distributions, "viscosity": dist.LogUniform(0.1, 1.0)}
+    (notice,) = prior_warnings(given, Prior(narrow))
+    assert str(baseline.path) in notice
+
+
 @pytest.mark.parametrize(
     ("options", "where"),
     [
@@ -149,7 +208,6 @@ def test_a_baseline_that_does_not_fit_is_refused_by_its_file(
         ({"out": "rig.csv"}, "rig.csv"),
         ({"timeout": -1.0}, "timeout"),
         ({"recordings": []}, "recordings"),
-        ({"prior": 3}, "prior"),
     ],
 )
 def test_what_no_baseline_can_be_made_of_is_refused_by_its_name(clean, tmp_path, options, where):

@@ -12,7 +12,7 @@ from bolfi_liquids.inference.criticism.model_errors import REPEATED
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
-from scipy.stats import binom, chi2, chisquare, norm
+from scipy.stats import binom, chi2, chisquare, invgamma, norm
 
 from bolfi_liquids import inference
 
@@ -241,6 +241,28 @@ def test_a_known_error_counts_as_clean_data_of_this_regime(clean, distance, weig
     for *_, taught in found.leave_one_out():  # each by the known error and the other
         assert taught.freedom == pytest.approx(4.0, abs=1e-3)
     assert criticism.learned_model_error([], known) is known
+
+
+@pytest.mark.parametrize(("sd", "agree"), [(0.1, True), (0.12, True), (0.5, False), (0.0, False)])
+def test_the_size_is_known_as_well_as_its_sources_agree(sd, agree):
+    """Thirty numbers of sd 0.1, five of another: pooled, or less than the pool where they differ.
+
+    Sizes are inverse-gamma (Gelman et al. 2013, section 2.6). For two sources the squared z score
+    of their difference is Birge's ratio.
+    """
+    alternating = sd * np.cos(np.pi * np.arange(40))[:, None]
+    clean = [criticism.CleanData(alternating, NOTHING)] * 5
+    found = criticism.learned_model_error(clean, criticism.model_error(0.1, 1.0, 30.0))
+    pooled = (30 * 0.1**2 + 5 * sd**2) / 35
+    assert found.autocovariance[0] == pytest.approx(pooled, rel=0.05)  # as positive as it must be
+    z = (sd**2 - 0.1**2) / (pooled * np.sqrt(2 / 30 + 2 / 5))
+    assert (abs(z) < 1.0) == agree
+    assert found.freedom == pytest.approx(35.0 if agree else 35.0 / z**2)
+    if agree:
+        size, log_weight = found.sizes(50)
+        closed = invgamma(35 / 2, scale=35 * found.autocovariance[0] / 2)
+        log_density = closed.logpdf(size * found.autocovariance[0]) + np.log(size)
+        np.testing.assert_allclose(np.diff(log_weight), np.diff(log_density), atol=1e-9)
 
 
 def test_the_covariance_is_positive_semidefinite():

@@ -147,6 +147,12 @@ PARTS = {
         (lambda: criticism.learned_model_error([]), "clean"),
         (lambda: criticism.learned_model_error([3]), "clean"),
         (lambda: criticism.learned_model_error([], 3), "known"),
+        (
+            lambda: criticism.learned_model_error(
+                [clean()], criticism.learned_model_error([clean()])
+            ),
+            "known",
+        ),
         (lambda: criticism.learned_model_error([clean(), clean(np.ones((9, 2)))]), "clean"),
         (lambda: criticism.learned_model_error([clean(), clean(np.ones((8, 1)))]), "clean"),
     ],
