@@ -33,11 +33,18 @@ TOGETHER = 4
 
 
 def versions(effects: Iterable[str]) -> list[str]:
-    """Names of effects, those of one's own with the SHA-256 of the file that defines them."""
+    """Names of effects, those of one's own with the digest of the files that define them."""
     from .models.effects import own_effects
 
     own = own_effects()
     return [f"{name} {own[name]}" if name in own else name for name in effects]
+
+
+def own_versions(effects: Iterable[str]) -> list[str]:
+    """`versions` of those effects that are one's own and registered in this process."""
+    from .models.effects import own_effects
+
+    return versions(sorted({*own_effects()} & {*effects}))
 
 
 class FluidSimulator(ABC):

@@ -15,7 +15,7 @@ DRAWS, TRIED = 512, 4  # of the prior; with which hooks are tried
 MAX_OUTSIDE = 0.01  # share of the prior beyond `lowest` and `highest`
 END = 1e-6  # of the way from the neutral coefficient to the prior's median
 LEAST_LOG_DENSITY = -100.0  # of the neutral coefficient, below the prior's largest
-NEUTRAL_TOLERANCE = 1e-6  # of the largest value, at the neutral coefficient
+TOLERANCE = 1e-6  # of the largest value, where nothing may change
 VISCOSITY_TOLERANCE = 1e-5  # likewise, in float32
 
 _untried: dict[str, np.ndarray] = {}  # coefficients by the name of an effect with a rheology
@@ -25,8 +25,8 @@ def check_effect(effect: Effect) -> None:
     """Refuse an effect whose prior or hooks break the rules of `Effect`.
 
     Each hook is called with `TRIED` draws of the prior and with the neutral coefficient, on arrays
-    of a made-up stir. A rheology is made, but tried with the first scene that compiles it: Taichi
-    is not started for it.
+    of a made-up stir, and must treat each simulation alike, whichever others are there. A rheology
+    is made, but tried with the first scene that compiles it: Taichi is not started for it.
 
     Raises:
         ValueError: the message says what is wrong, what was found, and what to do.
@@ -40,6 +40,7 @@ def check_effect(effect: Effect) -> None:
         tried = np.resize(coefficients[inside], TRIED)
         for name, call, given in _host_hooks(effect):
             _check_hook(name, call, given, effect.neutral, tried)
+            _check_lanes(name, call, given, tried)
         if effect.make_rheology is not None:
             _check_rheology_is_made(effect.make_rheology)
             _untried[effect.name] = tried
@@ -174,17 +175,55 @@ def _check_hook(
                     f"the hook {name} returned shape {after.shape} for {TRIED} simulations, "
                     f"expected {before.shape}; return the shape that it was given"
                 )
+            if after.dtype.kind not in "fiu":
+                raise ValueError(
+                    f"the hook {name} returned {after.dtype} values; return real numbers"
+                )
             if not np.isfinite(after).all():
                 raise ValueError(
                     f"the hook {name} returned values that are not finite with coefficients "
                     f"{coefficient}; narrow the prior, or mend the hook there"
                 )
             off = float(np.abs(after - before).max())
-            if (coefficient == neutral).all() and off > NEUTRAL_TOLERANCE * np.abs(before).max():
+            if (coefficient == neutral).all() and off > TOLERANCE * np.abs(before).max():
                 raise ValueError(
                     f"the hook {name} changes a value by {off:.3g} at the neutral coefficient "
                     f"{neutral:g}; let it change nothing there, or give another `neutral`"
                 )
+
+
+def _check_lanes(
+    name: str, call: Callable, given: tuple[np.ndarray, ...], tried: np.ndarray
+) -> None:
+    """Call a hook again, and with fewer simulations in another order: each keeps its values."""
+    arrays = (*given, tried)
+    every, fewer = np.arange(TRIED), np.arange(TRIED)[:0:-1]
+    first = _called(name, call, arrays, every)
+    for order, what in (
+        (every, "differ from call to call"),
+        (fewer, "depend on other simulations"),
+    ):
+        for all_of, some in zip(first, _called(name, call, arrays, order), strict=True):
+            wanted = all_of[order]
+            off = np.inf if some.shape != wanted.shape else np.abs(some - wanted).max()
+            if not off <= TOLERANCE * np.abs(all_of).max():  # nor NaN
+                raise ValueError(
+                    f"the hook {name} returns values that {what}; let each simulation's "
+                    "depend on its own arguments alone, without random numbers"
+                )
+
+
+def _called(
+    name: str, call: Callable, arrays: tuple[np.ndarray, ...], order: np.ndarray
+) -> list[np.ndarray]:
+    """What a hook returns for some of the simulations; times [T] are of all of them."""
+    try:
+        some = [array[order] if len(array) == TRIED else array.copy() for array in arrays]
+        return [np.asarray(array) for array in call(*some)]
+    except Exception as err:
+        raise ValueError(
+            f"the hook {name} fails with {len(order)} simulations: {_told(err)}"
+        ) from err
 
 
 def _check_rheology_is_made(make: Callable[[], Any]) -> None:

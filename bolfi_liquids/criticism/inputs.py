@@ -82,7 +82,7 @@ class Inputs:
 
     @property
     def made_from(self) -> dict[str, Any]:
-        """Settings and the SHA-256 of every file that decide a result, as JSON."""
+        """Settings, and the name of every file by its SHA-256, that decide a result, as JSON."""
         files = {
             "recordings": self.stirring.recordings,
             "held_out": self.held_out,
@@ -100,7 +100,7 @@ class Inputs:
                 for scene in ("stir", "pour")
             ],
             **{
-                group: {one.path.name: one.hash for one in some if one is not None}
+                group: {one.hash: one.path.name for one in some if one is not None}
                 for group, some in files.items()
             },
             "left_out": list(self.left_out),

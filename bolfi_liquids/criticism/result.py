@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from ..calibration.result import Calibration
 from ..drawing import shown
+from ..errors import InputError
 from ..inference.criticism.verdict_kind import VerdictKind
-from ..run.run import Run, RunOrPath
+from ..inputs.prior import PARAMETERS
+from ..run.run import RESULTS, Run, RunOrPath
 from ..wording import html_table, spoken
 from . import figures
 from .summary import CriticismSummary
@@ -175,10 +177,26 @@ def calibration_to_pour(run: Run) -> Calibration:
     """The calibration of a run, extended by what a criticism accepted.
 
     Raises:
-        InputError: The run has a criticism that is damaged or of another posterior: what it
-            accepted is part of what is known.
+        InputError: The run has a criticism that is not current or has accepted an effect that this
+            process does not know: what it accepted is part of what is known.
     """
     if run.why_not("criticise"):
         run.required("criticise")
     found = Criticism.of(run)
-    return Calibration.of(run) if found is None else found.calibration
+    if found is None:
+        return Calibration.of(run)
+    check_known(found.calibration)
+    return found.calibration
+
+
+def check_known(calibration: Calibration) -> None:
+    """Raise InputError where a posterior has an effect that this process does not know."""
+    from ..models import EFFECTS
+    from ..models.effects import OWN_EFFECTS
+
+    for name in sorted({*map(str, calibration.posterior)} - {*PARAMETERS, *EFFECTS}):
+        raise InputError(
+            f"there is no effect {name} here",
+            where=str(calibration.path / RESULTS["criticise"]),
+            fix=f"name the file that defines it in the environment variable {OWN_EFFECTS}",
+        )

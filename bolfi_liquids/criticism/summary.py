@@ -1,5 +1,6 @@
 """The section "criticise" of summary.json."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Self
@@ -266,7 +267,7 @@ class CriticismSummary(Section):
         held_out: Number of held-out data on which something was tried.
         reason: For the verdict.
         p_value: Of the base model, corrected for the number of sources.
-        probability: That the verdict is right, on the source where it is least.
+        probability: That the verdict is right, on all sources that give it.
         where: Windows in which the base model and the stirs differ, most significant first.
         coefficient: Of each accepted effect.
         parameters: All those of the last model.
@@ -329,7 +330,7 @@ class CriticismSummary(Section):
         posterior, given = tree["posterior"].to_dataset(), sources.values()
         parameters = {str(name): ParameterSummary.of(of) for name, of in posterior.items()}
         verdicts = list(map(SourceVerdict.of, given))
-        verdict, effects = _together(verdicts)
+        verdict, effects, probability = _together(verdicts)
         accepted, requested = (tuple(tree.attrs[name]) for name in ("accepted", "requested"))
         return cls(
             verdict=verdict,
@@ -341,7 +342,7 @@ class CriticismSummary(Section):
             held_out=min(one.held_out for one in verdicts if one.verdict == verdict),
             reason=" ".join(source.verdict.reason for source in given),
             p_value=min(1.0, len(verdicts) * min(one.p_value for one in verdicts)),
-            probability=min(one.probability for one in verdicts if one.verdict == verdict),
+            probability=probability,
             where=significant_windows(sources["stirs"]),
             coefficient={name: parameters[name] for name in accepted},
             parameters=parameters,
@@ -395,9 +396,11 @@ def unsupported(sources: "Sources") -> tuple[str, ...]:
     )
 
 
-def _together(sources: list[SourceVerdict]) -> tuple[VerdictKind, tuple[str, ...]]:
-    """One verdict on all data: what was named anywhere, or else the gravest."""
-    for verdict in GRAVEST_FIRST:
-        if named := [source for source in sources if source.verdict == verdict]:
-            return verdict, tuple(name for source in named for name in source.effects)
-    return VerdictKind.AGREEMENT, ()
+def _together(sources: list[SourceVerdict]) -> tuple[VerdictKind, tuple[str, ...], float]:
+    """One verdict on all data: what was named anywhere, or else the gravest; and the probability
+    that all sources which give it are right."""
+    given = {source.verdict for source in sources}
+    verdict = next((one for one in GRAVEST_FIRST if one in given), VerdictKind.AGREEMENT)
+    agreed = [source for source in sources if source.verdict == verdict]
+    effects = tuple(name for source in agreed for name in source.effects)
+    return verdict, effects, math.prod(source.probability for source in agreed)

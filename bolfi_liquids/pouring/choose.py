@@ -113,6 +113,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         made_from = {
             "after": latest.key,
             "given": digest_of_pours(run.path),
+            "effects": run.own_effects(),
             "settings": asdict(settings),
             "cups": cups.settings(),
             "forced": force,

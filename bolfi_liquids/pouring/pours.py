@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
 from ..inputs.prior import PARAMETERS
 from ..progress import Advance, silent
 from ..run.results import Number
@@ -51,22 +50,12 @@ def joint_prior(liquid: "Prior", names: Iterable[str], cups: "Cups") -> "Prior":
         liquid: Of viscosity and cohesion at least.
         names: Of parameters; those count that are effects which change a pour.
         cups: Whose range of angular velocities is taken.
-
-    Raises:
-        InputError: An effect is not registered in this process.
     """
     import numpyro.distributions as dist
 
     from ..inference import Prior
     from ..models import EFFECTS
-    from ..models.effects import OWN_EFFECTS
 
-    for name in sorted(set(names) - {*PARAMETERS, *EFFECTS}):
-        raise InputError(
-            f"there is no effect {name} here",
-            where="the posterior",
-            fix=f"name the file that defines it in the environment variable {OWN_EFFECTS}",
-        )
     effects = sorted(set(names) & {name for name, one in EFFECTS.items() if "pour" in one.scenes})
     return Prior(
         {

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..criticism.result import check_known
 from ..files import write_whole
 from ..inputs.cups import kept_cups
 from ..movie.file import encoded
@@ -114,8 +115,10 @@ def films_of(
         progress: Whether to show a bar on stderr.
 
     Raises:
+        InputError: This process does not know an accepted effect.
         RuntimeError: A simulation took longer than the timeout.
     """
+    check_known(calibration)
     settings, whole = calibration.record["settings"], calibration.run.recordings[0]
     start = whole.first(int(np.sum(whole.time - whole.time[0] <= MAX_STIR_SECONDS)))
     scenes: list[Any] = [(stir_simulator([start], int(settings["particles"])), {})]

@@ -17,6 +17,7 @@ from dataclasses import asdict, dataclass
 from difflib import get_close_matches
 from functools import cached_property
 from hashlib import sha256
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -28,6 +29,7 @@ from ..inputs.open import read_fields
 from ..inputs.prior import read_prior
 from ..inputs.recording import Recording, as_recording
 from ..inputs.settings import CalibrationSettings, CriticismSettings, PourSettings
+from ..simulators import own_versions
 from ..wording import command
 from .given_pours import GIVEN_POURS, digest_of_pours
 from .results import SUMMARY_FILE, generations, read_result, write_result, write_summary
@@ -363,6 +365,12 @@ class Run:
             return key_of(criticism)
         return key_of(self.required("calibrate"))
 
+    def own_effects(self) -> list[str]:
+        """Versions of one's own effects that the current criticism has accepted."""
+        criticism = self.result("criticise")
+        accepted = () if criticism is None else json.loads(criticism.attrs["summary"])["accepted"]
+        return own_versions(accepted)
+
     def again(self, step: str) -> str:
         """The command that makes a step's result, with the options of one that is readable."""
         if step == "calibrate":
@@ -375,7 +383,8 @@ class Run:
         except (OSError, ValueError):
             return command(step, self.path)
         usual = CriticismSettings() if step == "criticise" else PourSettings()
-        files = {name: list(made.get(name, ())) for name in ("held_out", "baseline", "pours")}
+        given = ("held_out", "baseline", "pours")
+        files = {name: list(made.get(name, {}).values()) for name in given}
         options = _options(
             {**made.get("settings", {}), **files}, {**asdict(usual), **dict.fromkeys(files)}
         )
@@ -398,11 +407,18 @@ class Run:
         except (OSError, ValueError):
             lost = "" if step == "calibrate" else ", and the options that it was made with are lost"
             return None, f"{path.name} is damaged{lost}"
-        why = self._stale(step, json.loads(tree.attrs["made_from"]))
+        accepted = json.loads(tree.attrs["summary"]).get("accepted", ())
+        why = self._stale(step, json.loads(tree.attrs["made_from"]), accepted)
         return (None, f"{path.name} {why}") if why else (tree, "")
 
-    def _stale(self, step: str, made_from: Mapping[str, Any]) -> str:
-        """The first difference of a result from the run; "" where it is current."""
+    def _stale(self, step: str, made_from: Mapping[str, Any], accepted: Sequence[str]) -> str:
+        """The first difference of a result from the run; "" where it is current.
+
+        Args:
+            step: Of `RESULTS`.
+            made_from: See `keep`.
+            accepted: Effects that the result adds to the model.
+        """
         if step == "calibrate":
             same = as_json(made_from) == as_json(self.made_from)
             return "" if same else f"was made by other settings than {RUN_TOML} holds"
@@ -417,6 +433,12 @@ class Run:
         if step == "pour" and made_from["given"] != (given := digest_of_pours(self.path)):
             which = "other given pours" if given else "given pours that are missing"
             return f"was made with {which}"
+        if step == "pour":
+            effects, made_with = self.own_effects(), made_from.get("effects", ())
+        else:
+            effects, made_with = own_versions(accepted), chain(*made_from.get("considered", ()))
+        for version in sorted({*effects} - {*made_with}):
+            return f"was made with other files of the effect {version.split()[0]}"
         return ""
 
     def _check_generation(self) -> None:

@@ -8,12 +8,13 @@ import importlib
 import inspect
 import os
 import pkgutil
+import secrets
 from collections.abc import Mapping
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import MappingProxyType
 
-from ..effect import Effect
+from ..effect import HOOKS, Effect
 from ..effect_check import check_effect
 
 OWN_EFFECTS = "BOLFI_LIQUIDS_EFFECTS"
@@ -37,6 +38,11 @@ def register(effect: Effect) -> Effect:
         ValueError: it is no `Effect`, its name is taken, or its prior or a hook breaks the rules
             (`effect_check`). A rheology is tried when a scene is first compiled with it.
     """
+    return _registered_from(effect, None)
+
+
+def _registered_from(effect: Effect, loaded: Path | None) -> Effect:
+    """See `register`; `loaded` is the file that was loaded for it, if any."""
     if not isinstance(effect, Effect):
         raise ValueError(f"register wants a models.Effect, got {effect!r}")
     if effect.name in _registered:
@@ -45,21 +51,27 @@ def register(effect: Effect) -> Effect:
             "choose another name"
         )
     check_effect(effect)
-    _digests[effect.name] = _digest_of_file(effect)
+    _digests[effect.name] = _digest(effect, loaded)
     _registered[effect.name] = effect
     return effect
 
 
 def own_effects() -> dict[str, str]:
-    """SHA-256 of the file that defines each effect that is not built in, "" if there is none."""
+    """Digest of the files that define each effect that is not built in: of its hooks, and of the
+    one that was loaded. An effect without a file has another one each time it is registered."""
     return {name: digest for name, digest in _digests.items() if name in _registered}
 
 
-def _digest_of_file(effect: Effect) -> str:
-    try:
-        return hashlib.sha256(Path(inspect.getfile(effect.make_prior)).read_bytes()).hexdigest()
-    except (OSError, TypeError):  # typed into a notebook, or no function
-        return ""
+def _digest(effect: Effect, loaded: Path | None) -> str:
+    hooks = [getattr(effect, hook) for hooks in HOOKS.values() for hook in hooks]
+    files = [] if loaded is None else [loaded.read_bytes()]
+    for function in (effect.make_prior, *filter(None, hooks)):
+        try:
+            files.append(Path(inspect.getfile(function)).read_bytes())
+        except (OSError, TypeError):  # typed into a notebook, or no function
+            if loaded is None:
+                return secrets.token_hex(32)  # nobody knows whether it has changed
+    return hashlib.sha256(b"".join(dict.fromkeys(files))).hexdigest()
 
 
 def _discover() -> None:
@@ -86,7 +98,10 @@ def _load(path: str) -> None:
             f"{OWN_EFFECTS} names {path}: {type(err).__name__}: {err}; it must be a Python file "
             "that defines EFFECT, a models.Effect"
         ) from err
-    register(effect)
+    try:
+        _registered_from(effect, Path(path))
+    except ValueError as err:
+        raise ValueError(f"{OWN_EFFECTS} names {path}: {err}") from err
 
 
 _discover()

@@ -235,7 +235,7 @@ MADE_FROM = {
     "version": bl.__version__,
     "settings": {"effects": ["camera_delay", "camera_tilt"], "seed": 3},
     "held_out": {},
-    "baseline": {"clean.nc": "abc123"},
+    "baseline": {"abc123": "clean.nc"},
     "pours": {},
     "held_out_pours": {},
 }

@@ -217,6 +217,11 @@ def late_time(time, angles, coefficient):
     return angles
 
 
+def rolled(time, angles, c):
+    """Random, and nothing at the neutral coefficient."""
+    return angles + c[:, None, None] * np.random.default_rng().normal()
+
+
 def rig_of(change):
     return {"acts_in": "rig", "rig": change, "signal": None}
 
@@ -231,6 +236,11 @@ def rig_of(change):
         ({"signal": doubled_in_place}, "signal writes into its arguments"),
         ({"signal": late_time}, "signal writes into its arguments"),
         ({"signal": lambda angles: angles}, "hook signal fails.*TypeError"),
+        ({"signal": lambda time, angles, c: angles + c.mean()}, "depend on other simulations"),
+        ({"signal": lambda time, angles, c: angles + c[0]}, "depend on other simulations"),
+        ({"signal": rolled}, "signal returns values that differ from call to call"),
+        ({"signal": lambda time, angles, c: angles + 0j}, "complex128 values"),
+        ({"signal": lambda time, angles, c: angles.astype(object)}, "object values"),
         (rig_of(lambda rig, c: c), "must return a Rig, got ndarray"),
         (rig_of(lambda rig, c: rig._replace(fill=0.05)), r"rig returned shape \(\)"),
         (rig_of(lambda rig, c: rig._replace(path=rig.path * np.nan)), "not finite"),

@@ -92,7 +92,7 @@ def test_clean_recordings_are_known_from_a_baseline_or_learned(calibration, clea
     given = open_clean([clean[0], baseline.path])
     inputs = open_inputs(calibration, CriticismSettings(), [], given)
     assert all(isinstance(one, Clean) for one in inputs.clean) and len(inputs.clean) == 2
-    assert inputs.made_from["baseline"] == {"a.nc": given[0].hash, "rig_error.nc": baseline.hash}
+    assert inputs.made_from["baseline"] == {given[0].hash: "a.nc", baseline.hash: "rig_error.nc"}
     compute = Compute(batch=CriticismSettings.batch)
     (learned,) = clean_residuals([given[0]], PARTICLES, calibration.prior, compute, lambda *_: None)
     np.testing.assert_array_equal(learned.residual, baseline.clean[0].residual)

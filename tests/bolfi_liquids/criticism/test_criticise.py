@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from bolfi_liquids.inference.criticism.verdict_kind import VerdictKind
 
 import bolfi_liquids as bl
 from bolfi_liquids.cli.printed import print_findings
 from bolfi_liquids.criticism.inputs import open_inputs
+from bolfi_liquids.criticism.summary import SourceVerdict, _together
 from bolfi_liquids.errors import Argument, InputError
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.cups import bundled_cups
@@ -72,8 +74,10 @@ def test_what_a_result_was_made_from_names_every_file(given):
     higher = cups.model_copy(update={"pour": cups.pour.model_copy(update={"lip_height": 0.21})})
     inputs = given(baseline="clean", held_out="held", pours="pours", cups=higher)
     made_from = inputs.made_from
-    assert set(made_from["baseline"]) == {"clean.nc"} and set(made_from["held_out"]) == {"held.nc"}
-    assert set(made_from["pours"]) == {"pours.csv"} and made_from["settings"]["seed"] == 0
+    for group, name in {"baseline": "clean", "held_out": "held"}.items():
+        assert list(made_from[group].values()) == [f"{name}.nc"]
+    assert list(made_from["pours"].values()) == ["pours.csv"]
+    assert made_from["settings"]["seed"] == 0
     assert made_from["poured"]["cups"]["pour"]["lip_height"] == 0.21 != cups.pour.lip_height
     assert inputs.level == 0.025  # of each of two sources
 
@@ -90,6 +94,33 @@ def test_other_settings_or_files_are_another_question(given):
     made_from = [inputs.made_from for inputs in asked]
     assert all(one != two for i, one in enumerate(made_from) for two in made_from[:i])
     assert made_from[0] == given().made_from
+
+
+def test_two_files_of_one_name_are_two(given):
+    both = given(baseline="held namesake").made_from
+    assert list(both["baseline"].values()) == ["held.nc", "held.nc"]
+    assert both not in [given(baseline=name).made_from for name in ("held", "namesake")]
+
+
+@pytest.mark.parametrize(
+    ("stirs", "pours", "expected"),
+    [
+        (("none", 0.9), ("none", 0.8), ("none", (), 0.72)),
+        (("effect", 0.9, "stick_mass"), ("none", 0.8), ("effect", ("stick_mass",), 0.9)),
+        (("tie", 0.9, "a", "b"), ("unknown", 0.8), ("tie", ("a", "b"), 0.9)),
+        (("effect", 0.9, "a"), ("effect", 0.5, "b"), ("effect", ("a", "b"), 0.45)),
+    ],
+)
+def test_sources_that_agree_are_all_right_with_the_product_of_their_probabilities(
+    stirs, pours, expected
+):
+    given = [
+        SourceVerdict(VerdictKind(verdict), tuple(effects), 0.5, probability, {}, {}, (), 0)
+        for verdict, probability, *effects in (stirs, pours)
+    ]
+    verdict, effects, probability = _together(given)
+    assert (verdict, effects) == expected[:2]
+    assert probability == pytest.approx(expected[2])
 
 
 def test_a_clean_recording_that_is_criticised_or_held_out_is_no_baseline(given):

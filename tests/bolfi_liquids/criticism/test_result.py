@@ -8,14 +8,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bolfi_liquids.inference.criticism import Suggestion
+from bolfi_liquids.inference.simulations import Compute
+from bolfi_liquids.models.effects import OWN_EFFECTS
 
 import bolfi_liquids as bl
+from bolfi_liquids import models
 from bolfi_liquids.calibration.summary import bad_fit
 from bolfi_liquids.criticism.result import calibration_to_pour
 from bolfi_liquids.criticism.summary import SuggestedExperiment
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.motions import Motion
+from bolfi_liquids.reporting.films import films_of
 from bolfi_liquids.run.run import Run
 
 
@@ -53,6 +57,19 @@ def test_the_motion_of_the_best_suggested_stir_is_kept_in_the_file(run, keep_cri
 
 def latest_of(path):
     return calibration_to_pour(Run.open(path))
+
+
+def test_an_accepted_effect_that_is_not_known_here_is_refused(criticised, monkeypatch):
+    """Whatever simulates with it; the report without films only tells of it."""
+    known = {name: one for name, one in models.EFFECTS.items() if name != "camera_delay"}
+    monkeypatch.setattr(models, "EFFECTS", known)
+    latest = bl.Criticism.open(criticised).calibration
+    uses = (lambda: latest_of(criticised), lambda: films_of(latest, None, Compute(batch=1)))
+    for use in uses:
+        with pytest.raises(InputError, match="no effect camera_delay") as refused:
+            use()
+        assert str(criticised / "criticism.nc") in refused.value.where
+        assert OWN_EFFECTS in refused.value.fix
 
 
 def test_an_extended_calibration_shows_its_own_parameters(extended, calibration, criticised):

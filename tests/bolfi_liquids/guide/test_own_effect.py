@@ -11,12 +11,8 @@ import pytest
 import xarray as xr
 from bolfi_liquids.models import effects as registry
 
-from bolfi_liquids.errors import InputError
 from bolfi_liquids.guide import read_page
 from bolfi_liquids.inputs.bundled import bundled_recording
-from bolfi_liquids.inputs.cups import bundled_cups
-from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.pouring.pours import joint_prior
 from bolfi_liquids.simulators import stir_simulator, versions
 
 EXAMPLE = Path(__file__).parents[2] / "extensions" / "clock_drift.py"
@@ -73,6 +69,7 @@ def test_a_file_that_defines_no_effect_is_refused(tmp_path, text, message):
         (tmp_path / "mine.py").write_text(text, encoding="utf-8")
     refused = run(STIR, [tmp_path / "mine.py"], tmp_path)
     assert refused.returncode == 2 and message in refused.stderr
+    assert str(tmp_path / "mine.py") in refused.stderr
     assert len(refused.stderr.splitlines()) == 1
 
 
@@ -92,7 +89,28 @@ def test_a_changed_file_is_another_simulator(tmp_path, monkeypatch):
     assert found[0] == found[1] and not set(found[0]) & {*found[2], stirring.identity}
 
 
-def test_a_pour_refuses_an_effect_that_this_process_does_not_know():
-    with pytest.raises(InputError, match="no effect not_here") as refused:
-        joint_prior(default_prior(), ["viscosity", "not_here"], bundled_cups())
-    assert registry.OWN_EFFECTS in refused.value.fix
+def test_every_file_that_defines_an_effect_decides(tmp_path, monkeypatch):
+    """That of a hook in another file, too; what was typed is never the same twice."""
+    for name in ("_registered", "_digests"):
+        monkeypatch.setattr(registry, name, dict(getattr(registry, name)))
+    monkeypatch.syspath_prepend(tmp_path)
+    mine, hook = tmp_path / "mine.py", tmp_path / "own_hook.py"
+
+    def digest(register):
+        effect = register()
+        registry._registered.pop("clock_drift", effect)
+        return registry._digests["clock_drift"]
+
+    def loaded(text):
+        hook.write_text(f"def signal(time, angles, c):\n    return angles  # {text}\n")
+        sys.modules.pop("own_hook", None)
+        registry._load(str(mine))
+
+    replaced = "EFFECT = dataclasses.replace(EFFECT, signal=own_hook.signal)"
+    text = "\n".join((example(), "import dataclasses, own_hook", replaced))
+    mine.write_text(text, encoding="utf-8")
+    first, same, other = (digest(lambda text=text: loaded(text)) for text in "aab")
+    assert first == same != other
+    exec(example(), typed := {"__name__": "typed"})
+    one, two = (digest(lambda: registry.register(typed["EFFECT"])) for _ in range(2))
+    assert one != two

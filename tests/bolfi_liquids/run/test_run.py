@@ -14,6 +14,7 @@ import pytest
 import tomli_w
 from bolfi_liquids.inference import engine_version
 from bolfi_liquids.inference.simulations.bank import Simulation
+from bolfi_liquids.models import effects
 from xarray import Dataset, DataTree
 
 import bolfi_liquids as bl
@@ -365,6 +366,28 @@ def test_no_pour_counts_beside_a_damaged_criticism_which_is_made_again_first(run
     assert run.result("pour") is None
     with pytest.raises(InputError, match=r"criticism\.nc is damaged.*bolfi-liquids criticise"):
         run.required("pour")
+
+
+def test_what_an_accepted_effect_of_ones_own_made_is_current_with_its_files_alone(
+    run, keep_criticism, made_from, monkeypatch
+):
+    """Where the effect is not known, what was made with it can still be read."""
+    own = {}
+    monkeypatch.setattr(effects, "own_effects", lambda: own)
+    made_from["considered"] = [["camera_delay first", "camera_tilt"], []]
+    keep_criticism(run.path)
+    tree = run.required("calibrate").copy()
+    from_effects = {"after": run.posterior_key(), "given": "", "effects": ["camera_delay first"]}
+    run.keep("pour", tree, from_effects, {"distance_cm": 2.0})
+    for digest, current in ((None, True), ("first", True), ("second", False)):
+        own.update({} if digest is None else {"camera_delay": digest, "other": "second"})
+        assert [(run.result(step) is not None) for step in ("criticise", "pour")] == [current] * 2
+    assert "other files of the effect camera_delay" in run.why_not("pour")
+    with pytest.raises(InputError, match="effect camera_delay.*bolfi-liquids criticise"):
+        run.required("pour")
+    made_from["considered"] = [["camera_delay second"], []]
+    keep_criticism(run.path)  # anew, and its draws are the same
+    assert "pour.nc was made with other files of the effect" in run.why_not("pour")
 
 
 def test_results_are_those_of_now(run, keep_criticism):
