@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -9,7 +10,7 @@ import numpy as np
 import tomli_w
 
 from .files import write_text
-from .inputs.recording import planned_recording
+from .inputs.recording import Recording, planned_recording
 from .inputs.strokes import resting, speed
 from .simulators import StirSimulator
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from .inference.criticism import Noise, Proposal
 
 FILE = "next_stir.toml"
-"""In RUN."""
+"""In RUN, by `criticise`."""
 
 PATTERNS = 9, 0, 2, 5
 """Vertices of a star, or 2 of a line; 0 is a circle."""
@@ -64,7 +65,8 @@ class Motion:
         from .hardware.motion import circle, star
 
         if self.pattern == "circle":
-            return circle(speed=self.speed, height=self.height, radius=self.radius, rest=REST)
+            sizes = {"height": self.height, "radius": self.radius, "cycles": self.cycles}
+            return circle(speed=self.speed, **sizes, rest=REST)
         named = {name: value for name, value in asdict(self).items() if name != "pattern"}
         return star(**named, rest=REST)
 
@@ -85,40 +87,52 @@ def family(stirring: "StirSimulator", count: int) -> list[Motion]:
     """Motions all over the family, each about as long as the first recording's stir.
 
     They go no farther from the axis than the recording, and within the speed and acceleration that
-    a rig's file allows if it states no limits.
+    a rig's file allows if it states no limits; but none is smaller or slower than any rig's file
+    may say.
     """
+    from .hardware.rig import StirringSettings
     from .inference.sobol import sobol
 
     recording, setup = stirring.recordings[0], stirring.setups[0]
-    position, moves = recording.gripper.position, recording.time[~resting(recording)]
-    away = float(np.linalg.norm(position[:, :2], axis=1).max())
-    fast = float(np.quantile(speed(recording), 0.95))
+    moves = recording.time[~resting(recording)]
+    away = float(np.nanmax(np.linalg.norm(recording.gripper.position[:, :2], axis=1)))
+    fast = float(np.nanquantile(speed(recording), 0.95))
     slow, fastest = (min(factor * fast, MAX_SPEED) for factor in SPEED_FACTORS)
     found = {}
     for k, (r, v, p, z) in enumerate(sobol(0, 0, count, 4).tolist()):
         points = PATTERNS[k % len(PATTERNS)]
         radius = away * (MIN_RADIUS_SHARE + (1.0 - MIN_RADIUS_SHARE) * r)
+        radius = StirringSettings.within("radius", round(radius, 4))
         within = np.inf if points else (CIRCLE_SHARE * ACCELERATION * radius) ** 0.5
         once = Motion(
             pattern="star" if points else "circle",
             points=points or 9,
-            radius=round(radius, 4),
-            speed=round(min(slow + (fastest - slow) * v, within), 3),
-            height=round(float(position[0, 2]) + MAX_RAISE * setup.submerged * z, 3),
+            radius=radius,
+            speed=StirringSettings.within(
+                "speed", round(min(slow + (fastest - slow) * v, within), 3)
+            ),
+            # up, so that none is deeper than the recording
+            height=ceil(1e3 * (_height(recording) + MAX_RAISE * setup.submerged * z) - 1e-6) / 1e3,
             pause=round(max(0.0, MAX_PAUSE * (2.0 * p - 1.0)), 1) if points else 0.0,
             cycles=1,
         )
         cycles = round((moves[-1] - moves[0]) / (once.path.time[-1] - 2.0 * REST))
-        motion = replace(once, cycles=max(cycles, 1))
+        motion = replace(once, cycles=StirringSettings.within("cycles", cycles))
         found[motion.label] = motion
     return list(found.values())
+
+
+def _height(recording: Recording) -> float:
+    """Of the gripper where it is first known [m]."""
+    z = recording.gripper.position[:, 2]
+    return float(z[np.isfinite(z)][0])
 
 
 def planned(stirring: "StirSimulator", motion: Motion) -> StirSimulator:
     """The first recording's rig on another path."""
     recording, setup, path = stirring.recordings[0], stirring.setups[0], motion.path
     plan = planned_recording(path.time, path.position, recording.attrs)
-    raised = motion.height - float(recording.gripper.position[0, 2])
+    raised = motion.height - _height(recording)
     return StirSimulator((plan,), (replace(setup, submerged=setup.submerged - raised),))
 
 
@@ -144,9 +158,9 @@ def stir_proposals(
     return made
 
 
-def keep_motion(run: Path, motion: Mapping[str, Any] | None) -> None:
-    """Write RUN/next_stir.toml, or remove that of an earlier suggestion."""
+def keep_motion(path: Path, motion: Mapping[str, Any] | None) -> None:
+    """Write a motion file, or remove that of an earlier suggestion."""
     if motion is None:
-        (run / FILE).unlink(missing_ok=True)
+        path.unlink(missing_ok=True)
     else:
-        write_text(run / FILE, tomli_w.dumps(dict(motion)))
+        write_text(path, tomli_w.dumps(dict(motion)))

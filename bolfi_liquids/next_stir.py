@@ -1,5 +1,6 @@
 """The next stir that tells most of the liquid, of a run whose model is settled."""
 
+import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -9,9 +10,10 @@ import numpy as np
 
 from .calibration.model_error import model_error
 from .calibration.stirs import camera_noise, sensor_noise, stir_experiment, with_model_error
+from .calibration.summary import bad_fit
 from .criticism.result import calibration_to_pour
 from .inputs.settings import CriticismSettings
-from .motions import FILE, Motion, family, keep_motion, planned
+from .motions import Motion, family, keep_motion, planned
 from .progress import phases
 from .run.compute import open_compute
 from .run.run import Run, RunOrPath
@@ -23,6 +25,11 @@ if TYPE_CHECKING:
     from .inference.criticism.design import Rival
     from .inference.criticism.study import Study
     from .inference.simulations import Workers
+
+logger = logging.getLogger(__name__)
+
+FILE = "design_stir.toml"
+"""In RUN, by `design_stir`."""
 
 MOTIONS = 8
 """That are considered, beside the first recording's own."""
@@ -43,7 +50,7 @@ class NextStir:
         cost: Its duration [s].
         sd_before, sd_after: Of the log of the viscosity, now and expected after it. The simulator's
             errors in the new stir count as independent of those in earlier ones.
-        motion: RUN/next_stir.toml; None where the same stir again is best.
+        motion: RUN/design_stir.toml; None where the same stir again is best.
     """
 
     label: str
@@ -64,7 +71,8 @@ def design_stir(
     """Find the motion that tells most of the liquid's viscosity, and write it into the run.
 
     Args:
-        calibration: Of stirs, or its RUN directory; effects that a criticism accepted count.
+        calibration: Of stirs, or its RUN directory; effects that a criticism accepted count. A bad
+            fit is warned of.
         seed: Of all random draws.
         executor, timeout: See `calibrate`.
         progress: Whether to show phases on stderr.
@@ -78,6 +86,8 @@ def design_stir(
 
     with Run.entered(calibration) as run, open_compute(executor, timeout) as compute:
         known = calibration_to_pour(run)
+        if (bad := bad_fit(known.summary)) is not None:
+            logger.warning("%s: %s", run.path, bad)
         posterior = {str(k): np.ravel(v) for k, v in known.posterior.data_vars.items()}
         particles = int(known.record["settings"]["particles"])
         stirring = stir_simulator(run.recordings[:1], particles)
@@ -95,7 +105,7 @@ def design_stir(
             raise RuntimeError(f"{run.path}: none of the proposed stirs could be simulated")
         best = found[0]
         motion = {one.label: asdict(one) for one in motions}.get(best.label)
-        keep_motion(run.path, motion)
+        keep_motion(run.path / FILE, motion)
     after = sd * remaining_sd(best.snr, apart / sd)
     return NextStir(best.label, best.cost, sd, after, run.path / FILE if motion else None)
 

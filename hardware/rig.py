@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import (
     BaseModel,
     GetCoreSchemaHandler,
+    PrivateAttr,
     ValidationInfo,
     field_validator,
     model_validator,
@@ -188,6 +189,10 @@ class LiquidSettings(RigSection, frozen=True):
     density: Annotated[float, Within(50.0, 20_000.0, "kg/m3", "no liquid is as light or as heavy")]
 
 
+MOTION_FIELDS = "pattern", "points", "radius", "speed", "acceleration", "height", "pause", "cycles"
+"""Of [stirring] that a motion file may have; the others are of the place."""
+
+
 class StirringSettings(RigSection, frozen=True):
     """The plan of a stir, in the cup's frame.
 
@@ -200,7 +205,7 @@ class StirringSettings(RigSection, frozen=True):
         clear_height: Of the pivot where the stick is out of the cup [m].
         approach_speed: Down into the cup and out of it [m/s].
         rest: Time at rest before and after [s]; the cameras' noise is learned from it.
-        pause: Time at rest at each vertex [s].
+        pause: Time at rest at each vertex of a star [s].
         cycles: Stars in a recording.
     """
 
@@ -221,6 +226,16 @@ class StirringSettings(RigSection, frozen=True):
     ] = 2.0
     pause: Annotated[float, Within(0.0, 60.0, "s", "the liquid is at rest long before")] = 0.0
     cycles: Annotated[int, Within(1, MAX_CYCLES, "times", "so often a pattern is stirred")] = 1
+
+    def faults(self) -> Iterator[str]:
+        if self.pattern == "circle" and self.pause:
+            yield f"pause {self.pause:g} s: a circle has no vertices to rest at; give 0"
+
+    @classmethod
+    def within[N: (int, float)](cls, name: str, value: N) -> N:
+        """The number, or the nearest that its field may have."""
+        (ends,) = (one for one in cls.model_fields[name].metadata if isinstance(one, Within))
+        return type(value)(min(max(value, ends.low), ends.high))
 
     @field_validator("points")
     @classmethod
@@ -400,7 +415,9 @@ class Limits(RigSection, frozen=True):
 
 
 class Rig(RigSection, frozen=True):
-    """All of a rig.toml."""
+    """All of a rig.toml, perhaps with the motion of another file."""
+
+    _motion_file: str = PrivateAttr("")
 
     robot: Robot
     cup: CupSettings
@@ -416,6 +433,17 @@ class Rig(RigSection, frozen=True):
         if (views := sorted(camera.view for camera in self.cameras)) != ["xz", "yz"]:
             raise ValueError(f"cameras: one must see xz and one yz, got {' and '.join(views)}")
         return self
+
+    @property
+    def motion_file(self) -> str:
+        """Path of the file that the motion is from; empty where it is the rig's own."""
+        return self._motion_file
+
+    def stirred_by(self, path: str) -> Self:
+        """The rig, whose motion is from a file."""
+        named = self.model_copy()
+        named._motion_file = path  # pyright: ignore[reportAttributeAccessIssue]  not a field
+        return named
 
     def camera(self, view: View) -> Camera:
         """The camera of one view."""

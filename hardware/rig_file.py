@@ -20,7 +20,7 @@ from .errors import RigError
 from .motion.kinematics import forward, inverse
 from .motion.poses import cup_frame, rotation_matrix
 from .motion.stir_paths import above_cup
-from .rig import CHECK_ENDS, MIN_CUP_RADIUS, Camera, Rig
+from .rig import CHECK_ENDS, MIN_CUP_RADIUS, MOTION_FIELDS, Camera, Rig, StirringSettings
 from .safety.limits import MAX_TILT, Workspace, workspace
 
 BUNDLED = "rig.toml"
@@ -58,13 +58,22 @@ def open_rig(path: str | Path) -> Rig:
 
 
 def with_motion(rig: Rig, path: str | Path) -> Rig:
-    """A rig that stirs as a motion file says: fields of [stirring], in the place of the rig's own.
+    """A rig that stirs as a motion file says: `MOTION_FIELDS` in the place of the rig's own.
 
     Raises:
-        RigError: The file is missing or cannot be used, or the rig does not allow that motion.
+        RigError: The rig or the file cannot be used, or the rig does not allow that motion.
     """
-    stirring = rig.stirring.model_dump() | _read(path, "motion file")
-    return _checked(rig.model_dump() | {"stirring": stirring}, str(path))
+    checked_rig(rig)  # its own faults are not the file's
+    written = _read(path, "motion file")
+    for name in written:
+        if name in StirringSettings.model_fields and name not in MOTION_FIELDS:
+            raise RigError(
+                "is a field of the place, not of a motion",
+                where=f"{path}: stirring.{name}",
+                fix=f"leave it out, rig.toml has it; a motion has {', '.join(MOTION_FIELDS)}",
+            )
+    stirring = rig.stirring.model_dump() | written
+    return _checked(rig.model_dump() | {"stirring": stirring}, str(path)).stirred_by(str(path))
 
 
 def _read(path: str | Path, kind: str) -> dict[str, Any]:

@@ -196,8 +196,8 @@ def criticise(  # noqa: PLR0913  an option each
 def design(run: RunArgument, compute: ComputeOptions) -> None:
     """Find the next stir that tells most of the liquid.
 
-    RUN/next_stir.toml gets its motion, for `record --motion`. If an effect is missing, `criticise`
-    finds the stir that tells which.
+    RUN/design_stir.toml gets its motion, for `record --motion`. If an effect is missing,
+    `criticise` finds the stir that tells which.
     """
     from ..next_stir import design_stir
 

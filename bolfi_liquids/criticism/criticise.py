@@ -23,7 +23,7 @@ from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import Pours, PourTable
 from ..inputs.recording import Recording
 from ..inputs.settings import CriticismSettings
-from ..motions import keep_motion, stir_proposals
+from ..motions import FILE, keep_motion, stir_proposals
 from ..progress import phases
 from ..run.compute import open_compute
 from ..run.given_pours import keep_pours
@@ -111,7 +111,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
                 keep_pours(run.path, inputs.table, inputs.cups)
             if (finished := Criticism.of(run)) and finished.made_from == inputs.made_from:
                 run.write_summary()
-                keep_motion(run.path, finished.summary.next_motion)
+                keep_motion(run.path / FILE, finished.summary.next_motion)
                 return finished
             with run.bank() as bank, phases(shown=progress) as report:
                 own = replace(compute, batch=settings.batch, bank=bank)
@@ -120,7 +120,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         seconds = time.perf_counter() - started
         summary = CriticismSummary.of(inputs, found, clean_runs, tree, seconds)
         run.keep("criticise", tree, inputs.made_from, summary.to_json())
-        keep_motion(run.path, summary.next_motion)
+        keep_motion(run.path / FILE, summary.next_motion)
         return Criticism.made(base, tree)
 
 

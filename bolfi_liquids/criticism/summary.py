@@ -276,7 +276,7 @@ class CriticismSummary(Section):
         gap: Between stirs and model, before and after.
         stirs: The verdict on them alone.
         pours: The verdict on them alone; None where there are none.
-        suggestions: Further experiments.
+        suggestions: Further experiments, best first.
         untested: Effects whose simulations failed, or that were not refitted.
         baseline: Number of clean recordings.
         baseline_left_out: Recordings given as clean that are criticised or held out.
@@ -327,6 +327,8 @@ class CriticismSummary(Section):
             tree: criticism.nc.
             seconds: Time that it took [s].
         """
+        from ..inference.criticism.design import rank
+
         posterior, given = tree["posterior"].to_dataset(), sources.values()
         parameters = {str(name): ParameterSummary.of(of) for name, of in posterior.items()}
         verdicts = list(map(SourceVerdict.of, given))
@@ -353,8 +355,7 @@ class CriticismSummary(Section):
             pours=PourVerdict.of(sources["pours"]) if "pours" in sources else None,
             suggestions=tuple(
                 SuggestedExperiment.of(one, inputs.motions)
-                for source in given
-                for one in source.suggestions
+                for one in sorted((one for of in given for one in of.suggestions), key=rank)
             ),
             untested=tuple(name for source in given for name in source.untested),
             baseline=len(inputs.clean),
@@ -376,8 +377,7 @@ class CriticismSummary(Section):
     @property
     def next_motion(self) -> Mapping[str, Any] | None:
         """Of the best suggested stir, if a stir is suggested."""
-        stirs = [one for one in self.suggestions if one.motion is not None]
-        return min(stirs, key=lambda one: one.wrong_after).motion if stirs else None
+        return next((one.motion for one in self.suggestions if one.motion is not None), None)
 
     @property
     def considered(self) -> tuple[str, ...]:

@@ -212,7 +212,7 @@ def criticism_facts(criticism: Criticism) -> Facts:
                 "cost": f"{one.cost_s:.0f} s",
                 "file": one.motion and one.motion == summary.next_motion,
             }
-            for one in sorted(summary.suggestions, key=lambda one: (one.wrong_after, -one.snr))
+            for one in summary.suggestions
         ],
         "noise": {
             "sd": degrees(summary.noise.sd_deg),

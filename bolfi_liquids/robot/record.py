@@ -49,7 +49,7 @@ def record(
 
     Args:
         rig: What is there, or its file; None is the bundled one. `hardware.with_motion` gives it
-            the motion of a RUN/next_stir.toml.
+            the motion of a file, such as RUN/next_stir.toml.
         out: Directory of the recording; new or empty.
         ask: Shows a person the plan, returns what the person typed.
         emulate: Use an emulated arm and rendered cameras, which look at this liquid; True takes

@@ -118,7 +118,7 @@ def strokes(rig: Rig, cycles: int | None = None) -> list[PosePath]:
     The star is that of `patterns.star`, but for its strokes, which last whole periods of the
     motion loop. The first one holds the rest above the cup's axis and the way to the first vertex,
     the last ends with a rest, and the others with a pause. A star ends at its first vertex and is
-    repeated from there. A circle never rests on its way: its cycles are its strokes.
+    repeated from there. The strokes of a circle are the cycles of `patterns.circle`.
 
     Raises:
         ValueError: `cycles` is below 1 or above `MAX_CYCLES`.
@@ -126,16 +126,17 @@ def strokes(rig: Rig, cycles: int | None = None) -> list[PosePath]:
     count = rig.stirring.cycles if cycles is None else cycles
     if not 1 <= count <= MAX_CYCLES:
         raise ValueError(f"cycles: {count} is not from 1 to {MAX_CYCLES}")
-    if rig.stirring.pattern == "circle":
-        return [_circle(rig)] * count
     plan = rig.stirring
     low = placed(above_cup(rig), z=plan.height)
-    once = [placed(low, x=x, y=y) for x, y in star_vertices(plan.points, plan.radius)]
-    corners = [low, once[0], *once[1:] * count]
-    lines = [
-        travel(rig, [start, end], plan.speed).pose
-        for start, end in zip(corners, corners[1:], strict=False)
-    ]
+    if plan.pattern == "circle":
+        lines = [_circle(rig)] * count
+    else:
+        once = [placed(low, x=x, y=y) for x, y in star_vertices(plan.points, plan.radius)]
+        corners = [low, once[0], *once[1:] * count]
+        lines = [
+            travel(rig, [start, end], plan.speed).pose
+            for start, end in zip(corners, corners[1:], strict=False)
+        ]
     rest, pause = (round(seconds * rig.robot.rate) for seconds in (plan.rest, plan.pause))
     waits = [pause] * (len(lines) - 1) + [rest]
     lines = [
@@ -200,18 +201,19 @@ def _line(start: np.ndarray, end: np.ndarray, speed: float, rig: Rig, dt: float)
     return np.column_stack([position, Slerp([0.0, 1.0], turns)(share).as_rotvec()])
 
 
-def _circle(rig: Rig) -> PosePath:
+def _circle(rig: Rig) -> np.ndarray:
+    """Poses of one cycle, at rest for a period of the motion loop before and after."""
     plan = rig.stirring
     path = circle(
         speed=plan.speed,
         height=plan.height,
         radius=plan.radius,
         turns=CIRCLE_TURNS,
-        rest=plan.rest,
+        rest=1.0 / rig.robot.rate,
         rate=rig.robot.rate,
     )
     turn = np.tile(rig.robot.stirring_orientation, (len(path.time), 1))
-    return _timed(rig, np.column_stack([path.position, turn]), stirring=True)
+    return np.column_stack([path.position, turn])
 
 
 def _timed(rig: Rig, pose: np.ndarray, *, stirring: bool = False) -> PosePath:

@@ -66,6 +66,7 @@ def describe(paths: Sequence[PosePath], rig: Rig, tool: Tool) -> str:
     """The plan as an operator reads it: where, how fast, how long."""
     box = workspace(rig, tool).box
     pose = np.concatenate([path.pose[:, :3] for path in paths])
+    stirs_by_file = tool == "stirring" and rig.motion_file
     speed = max(_fastest(path) for path in paths)
     tilt, rate = np.max([_turning(path) for path in paths], axis=0)
     sides = ", ".join(
@@ -80,6 +81,7 @@ def describe(paths: Sequence[PosePath], rig: Rig, tool: Tool) -> str:
             f"{tool} with the arm at {rig.robot.host}: {len(paths)} motions, "
             f"{sum(path.duration for path in paths):.0f} s",
             f"the tool's centre in the cup's frame: {sides}",
+            *([f"the stir is of the file {rig.motion_file}"] if stirs_by_file else []),
             "before that, from wherever the arm is: straight up, sideways, and down to the first",
             f"greatest speed {100 * speed:.1f} cm/s (allowed {100 * rig.limits.speed:.1f}), "
             f"force limit {rig.limits.force:.0f} N",

@@ -84,13 +84,14 @@ def suggest(
     first = [(one, _simulated(study, one, rivals, slice(0, 1))) for one in proposals]
     found = [(one, runs, assess(one, rivals, runs)) for one, runs in first if runs.size]
     finalists = []
-    for one, runs, _ in sorted(found, key=lambda of: _rank(of[2]))[:FINALISTS]:
+    for one, runs, _ in sorted(found, key=lambda of: rank(of[2]))[:FINALISTS]:
         more = _simulated(study, one, rivals, slice(1, None))
         finalists.append(assess(one, rivals, np.concatenate([runs, more], axis=1)))
-    return sorted(finalists, key=_rank)
+    return sorted(finalists, key=rank)
 
 
-def _rank(suggestion: Suggestion) -> tuple[float, float]:
+def rank(suggestion: Suggestion) -> tuple[float, float]:
+    """A key that sorts suggestions, best first."""
     return suggestion.error, -suggestion.snr
 
 

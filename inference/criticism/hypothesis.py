@@ -268,7 +268,7 @@ class ErrorSizes(NamedTuple):
 
     @in_float64
     def log_densities(self, rows: np.ndarray, mean: np.ndarray) -> np.ndarray:
-        """Log densities [n], but for (2 pi)^(m/2), of residuals `rows` [n, m], averaged over the sizes.
+        """Log densities [n], but for (2 pi)^(m/2), of residuals [n, m], averaged over the sizes.
 
         `mean` is the covariance of the noise at size 1 [m, m].
         """

@@ -9,7 +9,24 @@ import bolfi_liquids as bl
 from bolfi_liquids import next_stir
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.inputs.rigs import rig_of
-from bolfi_liquids.motions import FILE, Motion
+from bolfi_liquids.motions import Motion
+from bolfi_liquids.next_stir import FILE
+
+
+def test_a_bad_fit_is_warned_of(calibration, monkeypatch, caplog):
+    class Enough(Exception):
+        pass
+
+    def stopped(*_):
+        raise Enough
+
+    monkeypatch.setattr(next_stir, "family", stopped)
+    for bad in ("the fit is bad", None):
+        caplog.clear()
+        monkeypatch.setattr(next_stir, "bad_fit", lambda _, bad=bad: bad)
+        with pytest.raises(Enough):
+            bl.design_stir(calibration, progress=False)
+        assert [bad in one.getMessage() for one in caplog.records] == [True] * bool(bad)
 
 
 @pytest.mark.slow

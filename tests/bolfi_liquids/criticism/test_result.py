@@ -4,6 +4,8 @@ import json
 import pickle
 import shutil
 from dataclasses import replace
+from importlib import import_module
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from bolfi_liquids.inference.simulations import Compute
 from bolfi_liquids.models.effects import OWN_EFFECTS
 
 import bolfi_liquids as bl
-from bolfi_liquids import models
+from bolfi_liquids import models, next_stir
 from bolfi_liquids.calibration.summary import bad_fit
 from bolfi_liquids.criticism.result import calibration_to_pour
 from bolfi_liquids.criticism.summary import SuggestedExperiment
@@ -46,7 +48,7 @@ def test_the_motion_of_the_best_suggested_stir_is_kept_in_the_file(run, keep_cri
     ]
     made = [
         Suggestion(label, ("one", "other"), 5.0, error, 0.4, 8.0)
-        for label, error in (("a pour", 0.01), (motions[0].label, 0.1), (motions[1].label, 0.02))
+        for label, error in (("a pour", 0.01), (motions[1].label, 0.02), (motions[0].label, 0.1))
     ]
     suggestions = tuple(SuggestedExperiment.of(one, motions) for one in made)
     criticism = bl.Criticism.open(keep_criticism(run, suggestions=suggestions))
@@ -164,3 +166,14 @@ def test_no_pour_is_chosen_over_a_posterior_that_is_not_the_latest(criticised):
     base = bl.Criticism.open(criticised).base
     with pytest.raises(InputError, match="another posterior.*RUN directory"):
         bl.choose_pour(base, progress=False)
+
+
+def test_a_finished_criticism_leaves_what_design_wrote(criticised, monkeypatch):
+    designed = criticised / next_stir.FILE
+    designed.write_text("speed = 0.1\n")
+    made_from = bl.Criticism.open(criticised).made_from
+    same = SimpleNamespace(compared=[], left_out=[], table=None, made_from=made_from)
+    module = import_module("bolfi_liquids.criticism.criticise")
+    monkeypatch.setattr(module, "open_inputs", lambda *_: same)
+    bl.criticise(criticised, progress=False)
+    assert designed.read_text() == "speed = 0.1\n"

@@ -25,7 +25,7 @@ TIED = {
     "effects": EFFECTS[:2],
     "accepted": (),
     "coefficient": {},
-    "suggestions": (CIRCLES, STAR),
+    "suggestions": (STAR, CIRCLES),
 }
 UNKNOWN = {"verdict": VerdictKind.UNKNOWN, "effects": (), "accepted": (), "coefficient": {}}
 REFUTED = {**UNKNOWN, "refuted": ("camera_delay",)}
