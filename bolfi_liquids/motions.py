@@ -62,11 +62,14 @@ class Motion:
     @property
     def path(self) -> "Trajectory":
         """Of the gripper, thirty times a second."""
-        from .hardware.motion import circle, star
+        from .hardware.motion import Trajectory, circle, star
 
         if self.pattern == "circle":
-            sizes = {"height": self.height, "radius": self.radius, "cycles": self.cycles}
-            return circle(speed=self.speed, **sizes, rest=REST)
+            once = circle(speed=self.speed, height=self.height, radius=self.radius, rest=REST)
+            still = once.time < REST, once.time > once.time[-1] - REST
+            turned = np.tile(once.position[~(still[0] | still[1])], (self.cycles, 1))
+            position = np.concatenate([once.position[still[0]], turned, once.position[still[1]]])
+            return Trajectory(np.arange(len(position)) * once.time[1], position)
         named = {name: value for name, value in asdict(self).items() if name != "pattern"}
         return star(**named, rest=REST)
 

@@ -103,39 +103,36 @@ def travelled(
     return 0.5 * peak / ramp * rising**2 + peak * cruising + slowing
 
 
-def circle(  # noqa: PLR0913  a pattern has that many sizes
+def circle(
     *,
     speed: float,
     height: float,
     radius: float = 0.02,
     turns: float = 4.0,
     rest: float = 0.5,
-    cycles: int = 1,
     rate: float = 30.0,
 ) -> Trajectory:
     """Turns on a horizontal circle about the cup's axis, reached and left along a spiral.
 
-    The radius grows over the first half turn and shrinks over the last, both smoothly. Each cycle
-    begins and ends on the axis.
+    The radius grows over the first half turn and shrinks over the last, both smoothly.
 
     Args:
         speed: On the circle [m/s].
         height: Gripper above the cup's floor [m].
         radius: Of the circle [m].
-        turns: Of a cycle, at least 2.
+        turns: In all, at least 2.
         rest: Time at rest before and after [s].
-        cycles: How often the turns are made.
         rate: Samples per second.
 
     Raises:
         ValueError: an argument is not positive and finite, or there are fewer than 2 turns.
     """
-    check_positive(speed=speed, height=height, radius=radius, rest=rest, cycles=cycles, rate=rate)
+    check_positive(speed=speed, height=height, radius=radius, rest=rest, rate=rate)
     if not (np.isfinite(turns) and turns >= 2):
         raise ValueError(f"turns must be at least 2, got {turns}")
     duration = turns * 2.0 * np.pi * radius / speed
-    time = np.arange(0.0, cycles * duration + 2.0 * rest, 1.0 / rate)
-    turned = turns * (np.clip((time - rest) / duration, 0.0, cycles) % 1.0)
+    time = np.arange(0.0, duration + 2.0 * rest, 1.0 / rate)
+    turned = turns * np.clip((time - rest) / duration, 0.0, 1.0)
     near = np.clip(2.0 * np.minimum(turned, turns - turned), 0.0, 1.0)
     out = radius * np.sin(0.5 * np.pi * near) ** 2
     angle = 2.0 * np.pi * turned

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from against import neighbours, pour_bars
 from bolfi_liquids.models.accuracy import LARGEST_ERRORS
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -123,6 +124,7 @@ def page(measured: Record) -> str:
     pours = measured["pours"]
     usual = max(pours, key=float)  # the simulator's own cells; others are finer
     return environment.get_template(TEMPLATE).render(
+        any_viscosity=np.inf,
         stirs=_by_liquid(measured["stirs"]["recordings"]),
         ratios=sorted(measured["stirs"]["ratios"]),
         neighbour_bars=neighbours,

@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
+import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.models import runtime
 
@@ -31,7 +32,7 @@ def _effect(name, **changes):
         "acts_in": "liquid",
         "text": "Brought along.",
         "source": "This test",
-        "make_prior": lambda: None,
+        "make_prior": lambda: dist.HalfNormal(3.0),
     }
     return models.Effect(name=name, **{**fields, **changes})
 

@@ -8,6 +8,7 @@ from bolfi_liquids.hardware.motion import star
 from bolfi_liquids.inference import Bolfi
 from bolfi_liquids.inference.simulations import Simulation, columns
 from bolfi_liquids.inference.simulations.failures import raised
+from bolfi_liquids.models.accuracy import stirring_error
 
 import bolfi_liquids as bl
 from bolfi_liquids import models
@@ -189,9 +190,10 @@ def test_the_noise_of_a_fit_is_that_of_cameras_and_between_simulations(rng):
     found = fit_to_noise(observed, truth + spread, ones)
     assert found == pytest.approx(np.sqrt(2.0 / 3.0), rel=0.1)
     # without noise, a camera's is taken
+    error = np.degrees(stirring_error(1.0))
     still = np.repeat(truth[None], 3, axis=0)
     found = fit_to_noise(truth + np.radians(0.5), still, ones[:3])
-    assert found == pytest.approx(np.sqrt(0.5**2 - 0.05**2) / 0.1, rel=1e-6)
+    assert found == pytest.approx(np.sqrt(0.5**2 - error**2) / 0.1, rel=1e-6)
     # as much as the simulator errs by in a thin liquid is none of the fit's
     assert fit_to_noise(truth + np.radians(0.5), still, 1e-3 * ones[:3]) < 1e-6
 
