@@ -249,7 +249,7 @@ def _verdict(data: str, found: CriticismSummary | SourceVerdict) -> Facts:
         "data": data,
         "verdict": str(found.verdict),
         "p": f"{found.p_value:.2g}",
-        "probability": percent(found.probability),
+        "probability": percent(found.probability) if found.probability < 0.995 else "over 99 %",
         "effects": _spoken(found.effects),
         "confirmed": found.held_out > 0,
         "certain": found.held_out > 0 and found.probability >= CERTAIN,

@@ -228,7 +228,8 @@ def conclude(
     p, members = base.p_value, remaining(probability, candidates)
     if p >= level or credible(probability)[0] == NONE:
         lacks_nothing = probability[NONE]
-        reason = f"Model and data agree (p = {p:.2g}, {lacks_nothing:.0%} that nothing is missing)."
+        sure = f"{_percent(lacks_nothing)} that nothing is missing"
+        reason = f"Model and data agree (p = {p:.2g}, {sure})."
         return Verdict(VerdictKind.AGREEMENT, (), p, lacks_nothing, reason)
     differ = f"Model and data differ (p = {p:.2g}); "
     if not members:
@@ -237,10 +238,12 @@ def conclude(
     reached = sum(probability[label(one.names)] for one in members)
     names = tuple(dict.fromkeys(name for member in members for name in member.names))
     if len(members) > 1:
-        tie = f"one of {', '.join(names)} explains it ({reached:.0%}), and these data do not "
+        tie = f"one of {', '.join(names)} explains it ({_percent(reached)}), and these data do not "
         return Verdict(VerdictKind.TIE, names, p, reached, f"{differ}{tie}distinguish them.")
     confirmed = members[0].gaps and reached >= CERTAIN
-    explains = f"{label(names)} {'' if confirmed else 'probably '}explains it ({reached:.0%})."
+    explains = (
+        f"{label(names)} {'' if confirmed else 'probably '}explains it ({_percent(reached)})."
+    )
     return Verdict(VerdictKind.EFFECT, names, p, reached, differ + explains)
 
 
@@ -253,5 +256,12 @@ def _unexplained(explanations: Sequence[Candidate], probability: Mapping[str, fl
             "missing effect is unknown."
         )
     if best == OTHER:
-        return f"no known effect explains it ({probability[OTHER]:.0%})."
-    return f"{best} may explain it ({probability[best]:.0%}), which these data do not confirm."
+        return f"no known effect explains it ({_percent(probability[OTHER])})."
+    return (
+        f"{best} may explain it ({_percent(probability[best])}), which these data do not confirm."
+    )
+
+
+def _percent(probability: float) -> str:
+    """A probability for a person, to whom none is certain."""
+    return f"{probability:.0%}" if probability < 0.995 else "over 99%"
