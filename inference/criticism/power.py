@@ -48,9 +48,9 @@ def sensitivity(
     at = {key: np.asarray(value) for key, value in base.best.items()}
     zero = float(prior.to_unit({**at, name: np.asarray(neutral)})[-1])
 
-    def distance(u: float) -> float:
-        point = np.append(base.u, u)
-        return abs(float(prior.from_unit(point)[name]) - neutral)
+    def distance(u: np.ndarray) -> np.ndarray:
+        points = np.column_stack([np.tile(base.u, (len(u), 1)), u])
+        return np.abs(prior.from_unit(points)[name] - neutral)
 
     odds = PRIOR.none / PRIOR.share(1, effects)
     needed = np.sqrt(2.0 * (np.log(odds) - single.occam)) + ndtri(POWER)
@@ -59,10 +59,9 @@ def sensitivity(
         if abs(end - zero) > PRIOR_END:
             u = zero + (end - zero) * STEPS
             snr = np.maximum.accumulate(snr_of(base, changes_of(base, single, zero, u)))
-            reached = snr[-1] >= needed
-            found.append(distance(np.interp(needed, snr, u)) if reached else np.nan)
+            size = distance(np.interp([needed], snr, u))
+            found.append(size.item() if snr[-1] >= needed else np.nan)
     grid = (np.arange(GRID) + 0.5) / GRID
-    size = np.array([distance(u) for u in grid])
     weight = np.exp(-0.5 * ((grid - single.u[-1]) / single.coefficient_sds[-1]) ** 2)
-    (limit,) = weighted_quantiles(size, weight / weight.sum(), (LIMIT,))
+    (limit,) = weighted_quantiles(distance(grid), weight / weight.sum(), (LIMIT,))
     return Sensitivity(float(np.max(found)), float(limit))
