@@ -10,13 +10,12 @@ from ..surrogates.output_vectors import MIN_LONG
 from .experiment import Experiment
 from .hypothesis import error_sizes
 from .measurement_noise import Noise, gaussian, samples
-from .misfit import ACCEPTANCE_LEVEL, exceedance, judged_modes, orthonormal
+from .misfit import ACCEPTANCE_LEVEL, REPLICATES, exceedance, judged_modes, orthonormal
 from .run_noise import errors_of, smooth_covariance
 
 NOISE_QUANTILE = 0.99  # quantile of the noise's RMS below which a gap may be noise
 MAX_LEFT_SHARE = 0.5  # of a gap beyond noise that an explanation may leave, unless it may be noise
 MIN_LPD_GAIN = 3.0  # log predictive density to be won on all held-out data together
-REPLICATES = 999
 
 
 class Gap(NamedTuple):
@@ -84,9 +83,10 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
     runs at posterior draws differ by, pooled.
     """
     observed = experiment.corrected[np.isfinite(experiment.observed)]
-    fewer = 1.0 + 1.0 / min(len(before), len(after))  # the mean of few runs is noisy, too
-    at = samples(experiment.observed)
-    simulated, factor, span = judged(experiment.noise, experiment.observed, [before, after], fewer)
+    at, groups = samples(experiment.observed), [before, after]
+    simulated, factor, span = judged(
+        experiment.noise, experiment.observed, groups, _of_means(groups)
+    )
     rng = np.random.default_rng(seed)
     runs = gaussian(rng, simulated, REPLICATES)
     null = experiment.noise.draw(rng, at, REPLICATES) + runs
@@ -100,7 +100,9 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
     left = measures(observed - means[1:])[:, 0]
     sizes = np.sqrt(np.mean((observed - means) ** 2, axis=1))
     known = np.trace(experiment.measurement.covariance(at) + simulated) / len(observed)
-    gain = float(predictive_gains([experiment, experiment], [before, after])[0])
+    covariance = experiment.noise.covariance(at) + simulated
+    density = error_sizes(experiment.noise, at).log_densities(observed - means, covariance)
+    gain = float(density[1] - density[0])
     return Gap(
         label=experiment.label,
         before=float(sizes[0]),
@@ -124,10 +126,8 @@ def predictive_gains(experiments: Sequence[Experiment], groups: Sequence[np.ndar
         experiments: The same held-out one, with each model's noise.
         groups: Runs of each model.
     """
-    seen = np.isfinite(experiments[0].observed)
-    at, series = samples(experiments[0].observed), int(seen.sum()) >= MIN_LONG
-    fewer = 1.0 + 1.0 / min(map(len, groups))
-    simulated = fewer * smooth_covariance(errors_of(groups), at, series)
+    at, seen = samples(experiments[0].observed), np.isfinite(experiments[0].observed)
+    simulated = _simulated(experiments[0].observed, groups, _of_means(groups))
     density = [
         error_sizes(one.noise, at).log_densities(
             (one.corrected[seen] - made.mean(0))[None], one.noise.covariance(at) + simulated
@@ -135,6 +135,11 @@ def predictive_gains(experiments: Sequence[Experiment], groups: Sequence[np.ndar
         for one, made in zip(experiments, groups, strict=True)
     ]
     return np.array(density[1:]) - density[0]
+
+
+def _of_means(groups: Sequence[np.ndarray]) -> float:
+    """Factor of the simulator's own noise in a run less the mean of few, which is noisy, too."""
+    return 1.0 + 1.0 / min(map(len, groups))
 
 
 def judged(
@@ -150,7 +155,13 @@ def judged(
         Covariances [n, n] of that noise, a lower Cholesky factor [n, n] of it and the other noise,
         and the whitened directions in which models are judged, orthonormal [n, d].
     """
+    simulated = _simulated(observed, groups, factor)
     at, series = samples(observed), len(observed) >= MIN_LONG
-    simulated = factor * smooth_covariance(errors_of(groups), at, series)
     root = np.linalg.cholesky(noise.covariance(at) + simulated)
     return simulated, root, orthonormal(np.linalg.solve(root, judged_modes(at, series)))
+
+
+def _simulated(observed: np.ndarray, groups: Sequence[np.ndarray], factor: float) -> np.ndarray:
+    """Covariance [n, n] of what runs of a model differ by, pooled, times a factor."""
+    series = len(observed) >= MIN_LONG
+    return factor * smooth_covariance(errors_of(groups), samples(observed), series)

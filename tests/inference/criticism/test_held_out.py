@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bolfi_liquids.inference import criticism
-from bolfi_liquids.inference.criticism.held_out import NOISE_QUANTILE, gap, holds
+from bolfi_liquids.inference.criticism.held_out import NOISE_QUANTILE, gap, holds, predictive_gains
 from bolfi_liquids.inference.criticism.measurement_noise import samples
 from scipy.stats import binom, norm
 
@@ -123,6 +123,16 @@ def test_missing_samples_are_left_out():
     found = gap(experiment, before, EFFECT[kept] + after, 0)
     expected = np.sqrt(np.mean((EFFECT[kept] - before.mean(0)) ** 2))
     assert found.label == "gappy" and found.before == pytest.approx(expected)
+
+
+def test_a_gain_is_the_same_pairwise_and_among_all_where_there_is_one_other_model():
+    """Of few samples in two channels, too, which are no series however many values they are."""
+    rng = np.random.default_rng(0)
+    before, after = rng.normal(size=(2, 4, 10, 2))
+    experiment = criticism.Experiment(len, np.zeros((10, 2)), criticism.KnownNoise(0.1))
+    runs = [before.reshape(4, -1), after.reshape(4, -1)]
+    (among_all,) = predictive_gains([experiment, experiment], runs)
+    assert gap(experiment, *runs, 0).lpd_gain == pytest.approx(among_all)
 
 
 def test_the_mean_of_few_runs_is_noisy_too():
