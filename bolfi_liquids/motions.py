@@ -149,16 +149,15 @@ def stir_proposals(
         motions: Of the gripper.
         noise: Of the cameras, and the simulator's usual residual on other paths if it is known.
     """
+    return [proposed(planned(stirring, motion), motion.label, noise) for motion in motions]
+
+
+def proposed(plan: StirSimulator, label: str, noise: "Noise") -> "Proposal":
+    """A stir of one recording as an experiment that could be made; its cost is its duration [s]."""
     from .inference.criticism import Proposal
 
-    made = []
-    for motion in motions:
-        plan, cost = planned(stirring, motion), float(motion.path.time[-1])
-        shape = plan.observed.shape
-        made.append(
-            Proposal(plan.batched, noise, shape, plan.identity_with_effects, motion.label, cost)
-        )
-    return made
+    shape, duration = plan.observed.shape, float(np.ptp(plan.time))
+    return Proposal(plan.batched, noise, shape, plan.identity_with_effects, label, duration)
 
 
 def keep_motion(path: Path, motion: Mapping[str, Any] | None) -> None:

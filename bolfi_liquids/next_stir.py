@@ -13,7 +13,7 @@ from .calibration.stirs import camera_noise, sensor_noise, stir_experiment, with
 from .calibration.summary import bad_fit
 from .criticism.result import calibration_to_pour
 from .inputs.settings import CriticismSettings
-from .motions import Motion, family, keep_motion, planned
+from .motions import Motion, family, keep_motion, planned, proposed
 from .progress import phases
 from .run.compute import open_compute
 from .run.run import Run, RunOrPath
@@ -117,14 +117,13 @@ def _proposals(
 
     The simulator errs as the stick swings, so each is simulated once to see how it does.
     """
-    from .inference.criticism import KnownNoise, Proposal
+    from .inference.criticism import KnownNoise
 
     at = {name: np.array([value]) for name, value in theta.items()}
+    noise = KnownNoise(sensor_noise(stirring.observed))
     plans = {AGAIN: stirring} | {motion.label: planned(stirring, motion) for motion in motions}
     for label, plan in plans.items():
-        shape, duration = plan.observed.shape, float(np.ptp(plan.time))
-        noise = KnownNoise(sensor_noise(stirring.observed))
-        proposal = Proposal(plan.batched, noise, shape, plan.identity, label, duration)
+        proposal = proposed(plan, label, noise)
         (made,) = study.run_each("response", [at], proposal)
         for signal in made.signals:
             swung = replace(plan.recordings[0], inclination=signal)

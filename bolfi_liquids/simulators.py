@@ -32,7 +32,7 @@ TOGETHER = 4
 """Simulations that one thread makes at the same time."""
 
 
-def versions(effects: Iterable[str]) -> list[str]:
+def effect_versions(effects: Iterable[str]) -> list[str]:
     """Names of effects, those of one's own with the digest of the files that define them."""
     from .models.effects import own_effects
 
@@ -41,10 +41,10 @@ def versions(effects: Iterable[str]) -> list[str]:
 
 
 def own_versions(effects: Iterable[str]) -> list[str]:
-    """`versions` of those effects that are one's own and registered in this process."""
+    """`effect_versions` of those effects that are one's own and registered in this process."""
     from .models.effects import own_effects
 
-    return versions(sorted({*own_effects()} & {*effects}))
+    return effect_versions(sorted({*own_effects()} & {*effects}))
 
 
 class FluidSimulator(ABC):
@@ -64,7 +64,7 @@ class FluidSimulator(ABC):
         """Its identity where any effect may act: the files of one's own effects decide, too."""
         from .models.effects import own_effects
 
-        own = versions(sorted(own_effects()))
+        own = effect_versions(sorted(own_effects()))
         return json.dumps([self.identity, *own]) if own else self.identity
 
     @property
@@ -266,6 +266,6 @@ class PourSimulator(FluidSimulator):
     def identity(self) -> str:
         """Text that outcome, cups, density and effects decide."""
         name, *fixed = self.outcome.settings
-        effects = versions(self.effects)
+        effects = effect_versions(self.effects)
         made_of = [self.cups.settings(self.particles), self.density, effects, *fixed]
         return json.dumps([name, *made_of], sort_keys=True)

@@ -17,7 +17,7 @@ from ..inputs.pour_table import Pours, PourTable, check_scene, table_and_cups, t
 from ..inputs.recording import Recording
 from ..inputs.settings import FALSE_ALARM_RATE, CriticismSettings
 from ..motions import Motion, family
-from ..simulators import StirSimulator, stir_simulator, versions
+from ..simulators import StirSimulator, effect_versions, stir_simulator
 
 if TYPE_CHECKING:
     from ..inference.criticism import AutoregressiveNoise
@@ -96,7 +96,7 @@ class Inputs:
             # how many are simulated together changes no result
             "settings": {k: v for k, v in asdict(self.settings).items() if k != "batch"},
             "considered": [
-                versions(names_of_effects(scene, self.settings.effects))
+                effect_versions(names_of_effects(scene, self.settings.effects))
                 for scene in ("stir", "pour")
             ],
             **{

@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from bolfi_liquids.inference.criticism import KnownNoise
 from bolfi_liquids.models import effects as registry
 
 from bolfi_liquids.guide import read_page
 from bolfi_liquids.inputs.bundled import bundled_recording
-from bolfi_liquids.simulators import stir_simulator, versions
+from bolfi_liquids.motions import proposed
+from bolfi_liquids.simulators import effect_versions, stir_simulator
 
 EXAMPLE = Path(__file__).parents[2] / "extensions" / "clock_drift.py"
 COMMAND = Path(sys.executable).with_name("bolfi-liquids")
@@ -82,9 +84,11 @@ def test_a_changed_file_is_another_simulator(tmp_path, monkeypatch):
     for text in (example(), example(), example() + "# changed\n"):
         (tmp_path / "clock_drift.py").write_text(text, encoding="utf-8")
         registry._load(str(tmp_path / "clock_drift.py"))
-        kind, own = versions(["camera_delay", "clock_drift"])
+        kind, own = effect_versions(["camera_delay", "clock_drift"])
         assert kind == "camera_delay" and own.startswith("clock_drift ")
+        planned = proposed(stirring, "again", KnownNoise(0.01))
         found.append((own, stirring.identity_with_effects))
+        assert planned.identity == stirring.identity_with_effects
         del registry._registered["clock_drift"]
     assert found[0] == found[1] and not set(found[0]) & {*found[2], stirring.identity}
 
