@@ -18,13 +18,8 @@ true covariance of the data. None of them but the comparisons by prediction can 
 In the last three the posterior is Laplace's, in normal scores of the priors.
 """
 
-import argparse
-import os
 import sys
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from functools import cache
-from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
 
@@ -37,9 +32,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parent))
 
 from bolfi_liquids.inference.criticism.experiment import extended
-from data_sets import DataSet, files
-from kept import keep, results
-from machine import machine
+from data_sets import DataSet
+from every_set import main
 from subject import Subject, Trial
 from subjects import SUBJECTS
 
@@ -281,24 +275,5 @@ def examine(one: DataSet) -> dict:
     }
 
 
-def run(folder: Path, path: Path, workers: int, first: int | None) -> Iterator[dict]:
-    """Finish the comparison; yields each data set's result as it is kept."""
-    done, made = {(r["subject"], r["number"]) for r in results(path)}, machine()
-    for sets in files(folder):
-        left = [one for one in sets[:first] if (one.subject, one.number) not in done]
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-            for result in pool.map(examine, left, chunksize=4):
-                result["made"] = made
-                keep(path, result)
-                yield result
-
-
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("sets", type=Path, help="folder that data_sets.py wrote")
-    parser.add_argument("--out", type=Path, default=Path("others.jsonl"))
-    parser.add_argument("--first", type=int, help="how many sets of each subject; all by default")
-    parser.add_argument("--workers", type=int, default=os.cpu_count())
-    asked = parser.parse_args()
-    for count, _ in enumerate(run(asked.sets, asked.out, asked.workers, asked.first), 1):
-        print(f"\r{count}", end="", file=sys.stderr, flush=True)
+    main(examine, __doc__, "others.jsonl")

@@ -6,14 +6,9 @@ Each line of the file is one data set; a study that was interrupted goes on wher
 `table.py` makes a table of it.
 """
 
-import argparse
-import os
 import sys
 import time
 import traceback
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -22,9 +17,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parent))
 
 from bolfi_liquids.inference import criticism
-from data_sets import DataSet, files
-from kept import keep, results
-from machine import machine
+from data_sets import DataSet
+from every_set import main
 from subject import alone
 from subjects import SUBJECTS
 
@@ -95,26 +89,5 @@ def _gap(found: criticism.Criticism, one: DataSet) -> list[float] | None:
     return [float(np.linalg.norm(seen - mean) / noise) for mean in expected]
 
 
-def run(folder: Path, path: Path, workers: int, first: int | None) -> Iterator[dict]:
-    """Finish the study; yields each data set's result as it is kept."""
-    done = {(r["subject"], r["number"]) for r in results(path)}
-    sets = [one for file in files(folder) for one in file[:first]]
-    left = [one for one in sets if (one.subject, one.number) not in done]
-    left.sort(key=lambda one: one.number)
-    made = machine()
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        for result in pool.map(examine, left, chunksize=4):
-            result["made"] = made
-            keep(path, result)
-            yield result
-
-
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("sets", type=Path, help="folder that data_sets.py wrote")
-    parser.add_argument("--out", type=Path, default=Path("study.jsonl"))
-    parser.add_argument("--first", type=int, help="how many sets of each subject; all by default")
-    parser.add_argument("--workers", type=int, default=os.cpu_count())
-    asked = parser.parse_args()
-    for count, _ in enumerate(run(asked.sets, asked.out, asked.workers, asked.first), 1):
-        print(f"\r{count}", end="", file=sys.stderr, flush=True)
+    main(examine, __doc__, "study.jsonl")
