@@ -1,4 +1,4 @@
-"""What `register` tries of an effect before anything is simulated with it."""
+"""Checks of an effect at its registration, before anything is simulated with it."""
 
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
@@ -90,7 +90,7 @@ def check_rheology(effect: Effect) -> None:
 
 
 def _prior_faults(effect: Effect, prior: "Distribution") -> Iterator[str]:
-    """What keeps a prior from being one of the coefficient."""
+    """Faults of a prior of the coefficient."""
     from numpyro.distributions import Distribution
 
     if not isinstance(prior, Distribution):
@@ -216,7 +216,7 @@ def _check_lanes(
 def _called(
     name: str, call: Callable, arrays: tuple[np.ndarray, ...], order: np.ndarray
 ) -> list[np.ndarray]:
-    """What a hook returns for some of the simulations; times [T] are of all of them."""
+    """Arrays that a hook returns for some of the simulations; times [T] are of all of them."""
     try:
         some = [array[order] if len(array) == TRIED else array.copy() for array in arrays]
         return [np.asarray(array) for array in call(*some)]

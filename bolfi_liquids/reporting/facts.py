@@ -13,7 +13,7 @@ from ..calibration.result import Calibration
 from ..calibration.summary import CalibrationSummary, ParameterSummary, SamplerStatus, bad_fit
 from ..criticism.result import Criticism
 from ..criticism.summary import CriticismSummary, DifferingWindow, PourVerdict, SourceVerdict
-from ..inference.criticism.verdict_kind import CERTAIN, VerdictKind
+from ..inference.criticism.verdict_kind import CERTAIN, MAX_STATED, VerdictKind
 from ..models.numerics import is_tested
 from ..pouring.pours import TENTH, Hold
 from ..pouring.result import ActionSummary, GivenPour, GivenSummary, Pour
@@ -245,11 +245,12 @@ def verdict_facts(summary: CriticismSummary) -> Facts:
 def _verdict(data: str, found: CriticismSummary | SourceVerdict) -> Facts:
     """A conclusion on "all", "stirs" or "pours"."""
     limits = found.limits if isinstance(found, SourceVerdict) else {}
+    stated = found.probability
     facts = {
         "data": data,
         "verdict": str(found.verdict),
         "p": f"{found.p_value:.2g}",
-        "probability": percent(found.probability) if found.probability < 0.995 else "over 99 %",
+        "probability": percent(stated) if stated < MAX_STATED else "over 99 %",
         "effects": _spoken(found.effects),
         "confirmed": found.held_out > 0,
         "certain": found.held_out > 0 and found.probability >= CERTAIN,

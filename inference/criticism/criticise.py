@@ -252,10 +252,10 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     candidates = [one for one in sought if asked is None or one.names != asked.names]
     candidates += [asked] if asked else []
     extended = leading.hypothesis if leading else None
+    concluded = experiment.at((extended or base.hypothesis).best)
     left = []
     if extended is not None:
-        noise = experiment.at(extended.best).noise
-        null = null_draws(extended, noise, np.random.default_rng(seed))
+        null = null_draws(extended, concluded.noise, np.random.default_rng(seed))
         left = locate(extended, experiment.windows, null)
     return Criticism(
         verdict=verdict,
@@ -268,7 +268,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         after=tuple(left),
         suggestions=tuple(suggestions),
         untested=base.untested | _left_out(candidates),
-        experiment=experiment.at((extended or base.hypothesis).best),
+        experiment=concluded,
         units={name: one.unit for name, one in extensions.items()},
         tied=tuple(one.names for one in members if verdict.kind is not VerdictKind.AGREEMENT),
         probabilities=probability,

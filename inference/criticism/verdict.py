@@ -22,7 +22,7 @@ import numpy as np
 from .held_out import Gap, holds
 from .hypothesis import Hypothesis
 from .misfit import ACCEPTANCE_LEVEL, REPLICATES, Check
-from .verdict_kind import CERTAIN, NONE, OTHER, VerdictKind
+from .verdict_kind import CERTAIN, MAX_STATED, NONE, OTHER, VerdictKind
 
 REJECTION_LEVEL = 0.05  # p-value below which explanations are looked for
 MIN_GAIN = 2.0  # log likelihood below which an effect explains nothing
@@ -263,5 +263,5 @@ def _unexplained(explanations: Sequence[Candidate], probability: Mapping[str, fl
 
 
 def _percent(probability: float) -> str:
-    """A probability for a person, to whom none is certain."""
-    return f"{probability:.0%}" if probability < 0.995 else "over 99%"
+    """A probability for a person."""
+    return f"{probability:.0%}" if probability < MAX_STATED else "over 99%"

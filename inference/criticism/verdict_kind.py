@@ -3,6 +3,7 @@
 from enum import StrEnum
 
 CERTAIN = 0.95  # probability, on held-out data
+MAX_STATED = 0.995  # probability above which a person is told "over 99 %": none is certain
 NONE, OTHER = "none", "none of these"  # explanations without a known effect
 
 
