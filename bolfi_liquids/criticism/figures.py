@@ -47,7 +47,7 @@ HELD_OUT_MARKS = {
 """Marker, colour and label of each RMS on held-out recordings."""
 
 LINEAR_GAIN = 4.0
-"""Log likelihood up to which its axis is linear: the margin that decides between explanations."""
+"""Log likelihood up to which its axis is linear."""
 
 USUAL_SCORE = 2.0  # sd; 19 of 20 scores stay below it where nothing is missing
 HISTOGRAM_BINS = 40
