@@ -13,7 +13,7 @@ from .hypothesis import Hypothesis
 from .misfit import Check, Signature, scored_on_clean, signature
 from .runs import FIRST_HALF_WIDTH, LATER_HALF_WIDTH, PriorBox, Runs, joined, sides
 from .study import MIN_EFFECT_RUNS, AllRunsFailed, Plan, Report, Study, silent
-from .verdict import FAR_BEHIND, Candidate, near_best
+from .verdict import FAR_BEHIND, Candidate, may_rival, near_best
 
 BASE_PASSES = 6  # of runs of the base model, those after the first only until the fit is settled
 REFIT_PASSES = 4  # and of an explanation
@@ -183,7 +183,7 @@ def own_residual(
 def explain(
     study: Study, base: Base, accept: Sequence[str] | None = None
 ) -> tuple[list[Candidate], Candidate | None]:
-    """Fit every explanation by one effect, and pairs of effects where no single one suffices.
+    """Fit every explanation by one effect, and by pairs that may be as probable.
 
     Args:
         accept: Effects that are refitted together, whatever their rank.
@@ -207,24 +207,29 @@ def explain(
     if plan.look and len(near) > plan.refits:  # else all of them are refitted
         search.visit(LOOK, near, plan.look)
     search.refit(near_best(search.singles, plan.refits))
-    if not any(one.accepted for one in search.singles):
-        search.try_pairs()
+    search.try_pairs()
     found = list(search.found.values())
     return found, search.force(forced) if forced else None
 
 
 def unsought(base: Base) -> list[Candidate]:
     """Explanations by one effect where none was looked for; first fits tell less than scores."""
+    promised = promised_gains(base.check, base.signatures)
     return [
-        Candidate(one, base.check, promised_gain(base, name), one.occam, refitted=True)
+        Candidate(one, base.check, promised[name], one.occam, refitted=True)
         for name, one in base.singles.items()
     ]
 
 
-def promised_gain(base: Base, name: str) -> float:
-    """Log likelihood that an effect may gain by its score: half of its square (Rao 1948)."""
-    score, side = base.check.scores.get(name, 0.0), base.signatures[name].side
-    return 0.5 * (max(side * score, 0.0) if side else score) ** 2
+def promised_gains(tested: Check, signatures: Mapping[str, Signature]) -> dict[str, float]:
+    """Log likelihood that each effect may add to a tested model's: half of its squared score (Rao
+    1948)."""
+    scores = {name: tested.scores.get(name, 0.0) for name in signatures}
+    onward = {
+        name: max(one.side * scores[name], 0.0) if one.side else scores[name]
+        for name, one in signatures.items()
+    }
+    return {name: 0.5 * score**2 for name, score in onward.items()}
 
 
 class Search:
@@ -235,21 +240,20 @@ class Search:
         self.runs = base.runs
         self.counted = len(base.runs)  # those before are none of `Plan.most`
         self.limited = True
-        self.found = {of.names: self.candidate(of) for of in base.singles.values()}
+        promised = promised_gains(base.check, base.signatures)
+        self.found = {
+            of.names: self.candidate(of, promised[name]) for name, of in base.singles.items()
+        }
 
     @property
     def singles(self) -> list[Candidate]:
         return [one for one in self.found.values() if len(one.names) == 1]
 
-    def candidate(self, hypothesis: Hypothesis, refitted: bool = False) -> Candidate:
+    def candidate(self, hypothesis: Hypothesis, promise: float, refitted: bool = False) -> Candidate:
         """The extended model, tested."""
         tested, _ = self.study.check(hypothesis, self.base.signatures)
         gain = hypothesis.gain(self.base.hypothesis)
-        name, *others = hypothesis.names
-        promise = 0.0 if others else promised_gain(self.base, name)
-        return Candidate(
-            hypothesis, tested, gain, hypothesis.occam, refitted=refitted, promise=promise
-        )
+        return Candidate(hypothesis, tested, gain, hypothesis.occam, refitted, promise)
 
     def visit(
         self, phase: str, candidates: Sequence[Candidate], count: int, narrowing: int = 0
@@ -279,7 +283,7 @@ class Search:
             if one.names in boxes:
                 within = one.hypothesis.within.hull(boxes[one.names])
                 fitted = study.hypothesis(one.names, self.runs, within)
-                self.found[one.names] = self.candidate(fitted, one.refitted)
+                self.found[one.names] = self.candidate(fitted, one.promise, one.refitted)
         return boxes
 
     def refit(self, candidates: Sequence[Candidate]) -> None:
@@ -316,35 +320,34 @@ class Search:
             self.refit([one])
         return self.found[one.names]
 
-    def together(self, names: tuple[str, ...]) -> Candidate:
+    def together(self, names: tuple[str, ...], promise: float = 0.0) -> Candidate:
         """Effects that were simulated one by one, as if together: wherever any of them was."""
         box = self.base.box
         for name in names:
             within = self.found[(name,)].hypothesis.within
             box = box.hull(PriorBox(*(end[: len(box.low)] for end in within)))
-        return self.candidate(self.study.hypothesis(names, self.runs, box.extended(len(names))))
+        fitted = self.study.hypothesis(names, self.runs, box.extended(len(names)))
+        return self.candidate(fitted, promise)
 
     def try_pairs(self) -> None:
-        """Fit the best effect with those that its residual seems to need most. Single effects of an
-        accepted pair are refitted."""
+        """Fit the best effect with those that its residual seems to need, and refit the pairs that
+        may be as probable. Single effects of an accepted pair are refitted."""
         if not self.found:  # no effect could be simulated
             return
         self.counted = len(self.runs)
         best = max(self.singles, key=lambda c: c.gain)
-        signatures = self.base.signatures
-
-        def wanted(name: str) -> float:
-            score, side = best.check.scores[name], signatures[name].side
-            return side * score if side else abs(score)
-
-        others = sorted(best.check.scores, key=wanted, reverse=True)[: 2 * self.study.plan.refits]
+        added = promised_gains(best.check, self.base.signatures)
+        others = sorted(best.check.scores, key=lambda name: -added[name])
         # in the order of the registry: one pair has one name
         registry = list(self.study.extensions)
         pairs = [
-            self.together(tuple(sorted((*best.names, other), key=registry.index)))
-            for other in others
+            self.together(
+                tuple(sorted((*best.names, other), key=registry.index)), best.gain + added[other]
+            )
+            for other in others[: 2 * self.study.plan.refits]
         ]
-        pairs = sorted(pairs, key=lambda c: -c.gain)[: self.study.plan.refits]
+        pairs = [one for one in pairs if may_rival(one, best, len(registry))]
+        pairs = sorted(pairs, key=lambda c: -c.potential)[: self.study.plan.refits]
         self.found |= {one.names: one for one in pairs}
         self.refit(pairs)
         tried = [self.found[one.names] for one in pairs]

@@ -27,6 +27,7 @@ from .verdict_kind import CERTAIN, MAX_STATED, NONE, OTHER, VerdictKind
 REJECTION_LEVEL = 0.05  # p-value below which explanations are looked for
 MIN_GAIN = 2.0  # log likelihood below which an effect explains nothing
 FAR_BEHIND = 0.5  # of the best gain, below which one that does not pass is not worth more runs
+NEGLIGIBLE = 0.02  # of the best one's probability, below which a pair is not worth runs
 CREDIBLE = 0.9  # probability that the right explanation is among those that are named
 WRONG_P = 0.01  # so that a p-value of 0.01 is as probable under a right and a wrong explanation
 P_VALUE_STEP = 3.0 / (REPLICATES + 1.0)  # the smallest of a test that looks at two statistics
@@ -125,8 +126,8 @@ class Verdict:
             known effect explains it.
         effects: Their names.
         p_value: Of the base model.
-        probability: Probability that this conclusion is right; of a tie, that the right explanation
-            is among those named.
+        probability: Probability that this conclusion is right: of effects, that they are missing,
+            alone or with another; of a tie, that the right explanation is among those named.
         reason: The conclusion in a sentence.
     """
 
@@ -135,6 +136,18 @@ class Verdict:
     p_value: float
     probability: float
     reason: str
+
+
+def log_weight(one: Candidate, effects: int) -> float:
+    """Log of an explanation's prior probability times that of all data beyond the base model's;
+    `effects` are known."""
+    return float(np.log(PRIOR.share(len(one.names), effects))) + one.evidence
+
+
+def may_rival(pair: Candidate, best: Candidate, effects: int) -> bool:
+    """Whether a pair that was not refitted may be nearly as probable as one of its effects."""
+    reach = log_weight(pair, effects) + pair.potential - pair.gain
+    return reach > log_weight(best, effects) + np.log(NEGLIGIBLE)
 
 
 def near_best(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
@@ -159,9 +172,8 @@ def probabilities(base: Check, candidates: Sequence[Candidate], effects: int) ->
         effects: Number of known effects, fitted or not.
     """
     names = [NONE, *(label(one.names) for one in candidates)]
-    prior = [PRIOR.none, *(PRIOR.share(len(one.names), effects) for one in candidates)]
-    log_weight = np.log(prior) + [0.0, *(one.evidence for one in candidates)]
-    weight = np.exp(log_weight - log_weight.max())
+    logs = np.array([np.log(PRIOR.none), *(log_weight(one, effects) for one in candidates)])
+    weight = np.exp(logs - logs.max())
     best = int(np.argmax(weight))
     tests = [base.p_value]
     if best:
@@ -201,14 +213,19 @@ def remaining(probability: Mapping[str, float], candidates: Sequence[Candidate])
     """The credible explanations, most probable first.
 
     There are none where "none" or "none of these" is credible, where the most probable explanation
-    was not accepted, or where one alone is left and the held-out data show no gap.
+    was not accepted, or where it is part of all of them and the held-out data show no gap.
     """
     by_label = {label(one.names): one for one in candidates}
     found = credible(probability)
     if not set(found) <= by_label.keys() or not by_label[found[0]].accepted:
         return []
     members = [by_label[name] for name in found]
-    return members if len(members) > 1 or members[0].seen else []
+    return members if members[0].seen or not nested(members) else []
+
+
+def nested(members: Sequence[Candidate]) -> bool:
+    """Whether the first explanation is part of all."""
+    return all(set(members[0].names) <= set(one.names) for one in members)
 
 
 def conclude(
@@ -237,14 +254,17 @@ def conclude(
         return Verdict(VerdictKind.UNKNOWN, (), p, probability[OTHER], reason)
     reached = sum(probability[label(one.names)] for one in members)
     names = tuple(dict.fromkeys(name for member in members for name in member.names))
-    if len(members) > 1:
-        tie = f"one of {', '.join(names)} explains it ({_percent(reached)}), and these data do not "
-        return Verdict(VerdictKind.TIE, names, p, reached, f"{differ}{tie}distinguish them.")
+    if not nested(members):
+        tied = " or ".join(label(one.names) for one in members)
+        tie = f"{tied} explains it ({_percent(reached)}), and these data do not distinguish them."
+        return Verdict(VerdictKind.TIE, names, p, reached, differ + tie)
+    named = members[0].names
     confirmed = members[0].gaps and reached >= CERTAIN
-    explains = (
-        f"{label(names)} {'' if confirmed else 'probably '}explains it ({_percent(reached)})."
-    )
-    return Verdict(VerdictKind.EFFECT, names, p, reached, differ + explains)
+    explains = f"{label(named)} {'' if confirmed else 'probably '}explains it"
+    besides = " or ".join(name for name in names if name not in named)
+    perhaps = f", perhaps together with {besides}" if besides else ""
+    reason = f"{differ}{explains} ({_percent(reached)}){perhaps}."
+    return Verdict(VerdictKind.EFFECT, named, p, reached, reason)
 
 
 def _unexplained(explanations: Sequence[Candidate], probability: Mapping[str, float]) -> str:
