@@ -220,6 +220,18 @@ def test_two_effects_are_named_together_and_one_that_adds_nothing_is_not_needed(
     assert found.probabilities["offset with delay"] < 0.01
 
 
+def test_a_second_effect_is_weighed_where_one_passes_the_test(criticised):
+    """Drift alone passes with little of it: then both are probable."""
+    acting = {name: EXTENSIONS[name] for name in ("offset", "drift", "delay")}
+    found = [
+        criticised(experiment(seed=2, drift=0.06, offset=offset), acting)
+        for offset in (0.0, 0.03, 0.06)
+    ]
+    none, little, much = (one.probabilities["offset with drift"] for one in found)
+    assert none < 0.1 < little < 0.9 < much
+    assert found[1].singles["drift"].passes
+
+
 def test_effects_that_fail_together_are_accepted_as_they_are_alone(criticised):
     def apart(theta, seeds):
         return None if theta.keys() >= {"drift", "offset"} else oscillate(theta, seeds)

@@ -132,6 +132,18 @@ def test_a_second_effect_must_be_worth_its_prior():
     assert verdict(alone, pairs[1])[1] == ("drag", "tilt")
 
 
+def test_an_effect_in_all_that_is_probable_is_named_alone():
+    """What is then not known is whether another acts, too."""
+    alone = candidate("drag", gain=20.0)
+    both = candidate("drag", "tilt", gain=20.5)
+    found = probabilities(REJECTED, [alone, both], EFFECTS)
+    assert CREDIBLE > found["drag"] > found["drag with tilt"] > 0.1
+    told = concluded(alone, both)
+    assert (told.kind, told.effects) == ("effect", ("drag",)) and "tilt" in told.reason
+    assert told.probability == pytest.approx(found["drag"] + found["drag with tilt"])
+    assert verdict(alone, replace(both, gain=23.0)) == ("tie", ("drag", "tilt"))
+
+
 def test_probabilities_are_those_of_bayes_rule():
     """One normal datum of variance 1 whose mean is 0, or N(0, 3^2) if an effect acts: the exact
     ratio of evidences, by its gain and the share of the prior that explains it (Laplace)."""
