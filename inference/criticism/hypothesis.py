@@ -88,6 +88,11 @@ class Hypothesis:
         """Lower Cholesky factor of the difference's covariance [m, m]."""
         return np.linalg.cholesky(self.spread + self.noise)
 
+    @property
+    def doubt(self) -> float:
+        """Emulator's variance over all variance, summed over the data."""
+        return float(np.trace(self.whiten(self.whiten(self.latent))))
+
     @cached_property
     @in_float64
     def slopes(self) -> np.ndarray:

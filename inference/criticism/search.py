@@ -19,7 +19,7 @@ BASE_PASSES = 6  # of runs of the base model, those after the first only until t
 REFIT_PASSES = 4  # and of an explanation
 FULL_PASS = 8  # runs of a pass of refits, at least: fewer passes, and fuller calls
 SETTLED_GAIN = 4.0  # log likelihood by which a pass of runs may change a settled fit
-MAX_DOUBT = 1.0  # of a settled fit: emulator's variance over all variance, summed over the data
+MAX_DOUBT = 1.0  # of a settled fit
 SIDE_SHARES = (0.7, 0.35)  # of the prior quantiles from neutral to an end: where effects are tried
 LOOK = "look"  # phase of the first runs of effects where they seem to fit best
 CLEAN_PASSES = 2  # of runs where the model fits clean data best: so far, and with the first's runs
@@ -70,8 +70,7 @@ def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Prio
 
 def settled(gained: float, fitted: Hypothesis, box: PriorBox) -> bool:
     """Whether the runs in a box left a fit as good as it was, well known and inside of them."""
-    doubt = np.trace(fitted.whiten(fitted.whiten(fitted.latent)))
-    return abs(gained) <= SETTLED_GAIN and doubt <= MAX_DOUBT and box.encloses(fitted.u)
+    return abs(gained) <= SETTLED_GAIN and fitted.doubt <= MAX_DOUBT and box.encloses(fitted.u)
 
 
 def examine(study: Study, earlier: Runs | None) -> Base:
@@ -331,11 +330,17 @@ class Search:
 
     def try_pairs(self) -> None:
         """Fit the best effect with those that its residual seems to need, and refit the pairs that
-        may be as probable. Single effects of an accepted pair are refitted."""
+        may be as probable. Single effects of an accepted pair are refitted.
+
+        Beside an effect that suffices there are none while its own fit is in doubt: a second
+        coefficient would fit what the emulator errs by.
+        """
         if not self.found:  # no effect could be simulated
             return
         self.counted = len(self.runs)
         best = max(self.singles, key=lambda c: c.gain)
+        if any(one.accepted for one in self.singles) and best.hypothesis.doubt > MAX_DOUBT:
+            return
         added = promised_gains(best.check, self.base.signatures)
         others = sorted(best.check.scores, key=lambda name: -added[name])
         # in the order of the registry: one pair has one name

@@ -27,7 +27,7 @@ from .verdict_kind import CERTAIN, MAX_STATED, NONE, OTHER, VerdictKind
 REJECTION_LEVEL = 0.05  # p-value below which explanations are looked for
 MIN_GAIN = 2.0  # log likelihood below which an effect explains nothing
 FAR_BEHIND = 0.5  # of the best gain, below which one that does not pass is not worth more runs
-NEGLIGIBLE = 0.02  # of the best one's probability, below which a pair is not worth runs
+NEGLIGIBLE = 0.05  # of the best one's probability, below which a pair is not worth runs
 CREDIBLE = 0.9  # probability that the right explanation is among those that are named
 WRONG_P = 0.01  # so that a p-value of 0.01 is as probable under a right and a wrong explanation
 P_VALUE_STEP = 3.0 / (REPLICATES + 1.0)  # the smallest of a test that looks at two statistics
