@@ -26,6 +26,9 @@ CLEAN_PASSES = 2  # of runs where the model fits clean data best: so far, and wi
 CLEAN_RUNS = 2  # of each; the mean of the last is free of the emulator's error
 
 
+NOWHERE: Mapping[tuple[str, ...], np.ndarray] = {}
+
+
 class Base(NamedTuple):
     """The base model and what the effects would do to it.
 
@@ -255,9 +258,14 @@ class Search:
         return Candidate(hypothesis, tested, gain, hypothesis.occam, refitted, promise)
 
     def visit(
-        self, phase: str, candidates: Sequence[Candidate], count: int, narrowing: int = 0
+        self,
+        phase: str,
+        candidates: Sequence[Candidate],
+        count: int,
+        narrowing: int = 0,
+        starts: Mapping[tuple[str, ...], np.ndarray] = NOWHERE,
     ) -> dict[tuple[str, ...], PriorBox]:
-        """Simulate each of them near its optimum, all in one call, and fit it again.
+        """Simulate each of them near its optimum, or its start, all in one call, and fit it again.
 
         Returns:
             The boxes in which that succeeded. No more runs than planned are made: of candidates
@@ -268,9 +276,10 @@ class Search:
             fitted = one.hypothesis
             # what is best at the end of what was simulated is looked for well beyond
             near = one.refitted or phase != LOOK
-            near = near and fitted.within.encloses(fitted.u)
+            near = one.names in starts or near and fitted.within.encloses(fitted.u)
             least = LATER_HALF_WIDTH / 2**narrowing if near else FIRST_HALF_WIDTH
-            boxes[one.names] = PriorBox.around(fitted.u, fitted.sd, least)
+            centre = starts.get(one.names, fitted.u)
+            boxes[one.names] = PriorBox.around(centre, fitted.sd, least)
         left = study.plan.most - (len(self.runs) - self.counted)
         if self.limited:
             boxes = dict(list(boxes.items())[: max(left // count, 0)])
@@ -285,15 +294,23 @@ class Search:
                 self.found[one.names] = self.candidate(fitted, one.promise, one.refitted)
         return boxes
 
-    def refit(self, candidates: Sequence[Candidate]) -> None:
+    def refit(
+        self,
+        candidates: Sequence[Candidate],
+        starts: Mapping[tuple[str, ...], np.ndarray] = NOWHERE,
+    ) -> None:
         """Visit candidates until their fits are settled and pass, or are behind those that do.
 
         A fit that is not settled may come to what the effect's score promises.
+
+        Args:
+            starts: Prior quantiles [d] of the first visit of some, by names.
         """
         for attempt in range(REFIT_PASSES):
             before = {one.names: one.gain for one in candidates}
             count = max(self.study.plan.refit, FULL_PASS // max(len(candidates), 1))
-            boxes = self.visit(f"refit {attempt}", candidates, count, attempt)
+            from_here = NOWHERE if attempt else starts
+            boxes = self.visit(f"refit {attempt}", candidates, count, attempt, from_here)
             for names in boxes:
                 self.found[names] = replace(self.found[names], refitted=True)
             tried = sorted((self.found[names] for names in boxes), key=lambda one: -one.gain)
@@ -330,7 +347,8 @@ class Search:
 
     def try_pairs(self) -> None:
         """Fit the best effect with those that its residual seems to need, and refit the pairs that
-        may be as probable. Single effects of an accepted pair are refitted.
+        may be as probable. The effects of the best accepted pair are refitted one by one where the
+        pair fits: each may do as well alone.
 
         Beside an effect that suffices there are none while its own fit is in doubt: a second
         coefficient would fit what the emulator errs by.
@@ -355,7 +373,12 @@ class Search:
         pairs = sorted(pairs, key=lambda c: -c.potential)[: self.study.plan.refits]
         self.found |= {one.names: one for one in pairs}
         self.refit(pairs)
-        tried = [self.found[one.names] for one in pairs]
-        named = dict.fromkeys(name for one in tried if one.accepted for name in one.names)
-        alone = [self.found[(name,)] for name in named]
-        self.refit([one for one in alone if not one.refitted])
+        accepted = [one for one in self.found.values() if len(one.names) > 1 and one.accepted]
+        if accepted:
+            together = max(accepted, key=lambda c: c.gain).hypothesis
+            rest = len(together.u) - len(together.names)
+            starts = {
+                (name,): np.append(together.u[:rest], together.u[rest + k])
+                for k, name in enumerate(together.names)
+            }
+            self.refit([self.found[names] for names in starts], starts)
