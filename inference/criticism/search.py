@@ -26,9 +26,6 @@ CLEAN_PASSES = 2  # of runs where the model fits clean data best: so far, and wi
 CLEAN_RUNS = 2  # of each; the mean of the last is free of the emulator's error
 
 
-NOWHERE: Mapping[tuple[str, ...], np.ndarray] = {}
-
-
 class Base(NamedTuple):
     """The base model and what the effects would do to it.
 
@@ -251,21 +248,18 @@ class Search:
     def singles(self) -> list[Candidate]:
         return [one for one in self.found.values() if len(one.names) == 1]
 
-    def candidate(self, hypothesis: Hypothesis, promise: float, refitted: bool = False) -> Candidate:
+    def candidate(
+        self, hypothesis: Hypothesis, promise: float, refitted: bool = False
+    ) -> Candidate:
         """The extended model, tested."""
         tested, _ = self.study.check(hypothesis, self.base.signatures)
         gain = hypothesis.gain(self.base.hypothesis)
         return Candidate(hypothesis, tested, gain, hypothesis.occam, refitted, promise)
 
     def visit(
-        self,
-        phase: str,
-        candidates: Sequence[Candidate],
-        count: int,
-        narrowing: int = 0,
-        starts: Mapping[tuple[str, ...], np.ndarray] = NOWHERE,
+        self, phase: str, candidates: Sequence[Candidate], count: int, narrowing: int = 0
     ) -> dict[tuple[str, ...], PriorBox]:
-        """Simulate each of them near its optimum, or its start, all in one call, and fit it again.
+        """Simulate each of them near its optimum, all in one call, and fit it again.
 
         Returns:
             The boxes in which that succeeded. No more runs than planned are made: of candidates
@@ -276,10 +270,9 @@ class Search:
             fitted = one.hypothesis
             # what is best at the end of what was simulated is looked for well beyond
             near = one.refitted or phase != LOOK
-            near = one.names in starts or near and fitted.within.encloses(fitted.u)
+            near = near and fitted.within.encloses(fitted.u)
             least = LATER_HALF_WIDTH / 2**narrowing if near else FIRST_HALF_WIDTH
-            centre = starts.get(one.names, fitted.u)
-            boxes[one.names] = PriorBox.around(centre, fitted.sd, least)
+            boxes[one.names] = PriorBox.around(fitted.u, fitted.sd, least)
         left = study.plan.most - (len(self.runs) - self.counted)
         if self.limited:
             boxes = dict(list(boxes.items())[: max(left // count, 0)])
@@ -294,23 +287,15 @@ class Search:
                 self.found[one.names] = self.candidate(fitted, one.promise, one.refitted)
         return boxes
 
-    def refit(
-        self,
-        candidates: Sequence[Candidate],
-        starts: Mapping[tuple[str, ...], np.ndarray] = NOWHERE,
-    ) -> None:
+    def refit(self, candidates: Sequence[Candidate]) -> None:
         """Visit candidates until their fits are settled and pass, or are behind those that do.
 
         A fit that is not settled may come to what the effect's score promises.
-
-        Args:
-            starts: Prior quantiles [d] of the first visit of some, by names.
         """
         for attempt in range(REFIT_PASSES):
             before = {one.names: one.gain for one in candidates}
             count = max(self.study.plan.refit, FULL_PASS // max(len(candidates), 1))
-            from_here = NOWHERE if attempt else starts
-            boxes = self.visit(f"refit {attempt}", candidates, count, attempt, from_here)
+            boxes = self.visit(f"refit {attempt}", candidates, count, attempt)
             for names in boxes:
                 self.found[names] = replace(self.found[names], refitted=True)
             tried = sorted((self.found[names] for names in boxes), key=lambda one: -one.gain)
@@ -348,7 +333,7 @@ class Search:
     def try_pairs(self) -> None:
         """Fit the best effect with those that its residual seems to need, and refit the pairs that
         may be as probable. The effects of the best accepted pair are refitted one by one where the
-        pair fits: each may do as well alone.
+        pair fits: each may come as far alone.
 
         Beside an effect that suffices there are none while its own fit is in doubt: a second
         coefficient would fit what the emulator errs by.
@@ -375,10 +360,16 @@ class Search:
         self.refit(pairs)
         accepted = [one for one in self.found.values() if len(one.names) > 1 and one.accepted]
         if accepted:
-            together = max(accepted, key=lambda c: c.gain).hypothesis
-            rest = len(together.u) - len(together.names)
-            starts = {
-                (name,): np.append(together.u[:rest], together.u[rest + k])
-                for k, name in enumerate(together.names)
-            }
-            self.refit([self.found[names] for names in starts], starts)
+            pair = max(accepted, key=lambda c: c.gain)
+            alone = [self.found[(name,)] for name in pair.names]
+            short = FAR_BEHIND * pair.gain, pair.gain - SETTLED_GAIN
+            self.refit([_moved(one, pair) for one in alone if short[0] < one.gain < short[1]])
+
+
+def _moved(one: Candidate, pair: Candidate) -> Candidate:
+    """The explanation by one effect of a pair, where the pair fits best."""
+    names, best, single = pair.hypothesis.fit.prior.names, pair.hypothesis.u, one.hypothesis
+    other = {*pair.names} - {*one.names}
+    u = np.array([at for name, at in zip(names, best, strict=True) if name not in other])
+    within = single.within.hull(PriorBox.around(u, single.sd, LATER_HALF_WIDTH))
+    return replace(one, hypothesis=replace(single, u=u, within=within))
