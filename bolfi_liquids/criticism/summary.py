@@ -35,6 +35,7 @@ class SourceVerdict:
     Attributes:
         verdict: The conclusion.
         effects: What it names: the effect, or those that are tied.
+        perhaps: Effects that may act besides.
         p_value: Of the base model.
         probability: That the verdict is right.
         probabilities: Of "none", of each explanation and of "none of these".
@@ -46,6 +47,7 @@ class SourceVerdict:
 
     verdict: VerdictKind
     effects: tuple[str, ...]
+    perhaps: tuple[str, ...]
     p_value: Number
     probability: Number
     probabilities: Mapping[str, Number]
@@ -61,6 +63,7 @@ class SourceVerdict:
         return cls(
             VerdictKind(verdict.kind),
             tuple(verdict.effects),
+            verdict.perhaps,
             verdict.p_value,
             verdict.probability,
             dict(source.probabilities),
@@ -260,6 +263,7 @@ class CriticismSummary(Section):
     Attributes:
         verdict: On all data together.
         effects: What it names: the effect, or those that are tied.
+        perhaps: Effects that may act besides.
         accepted: Effects that joined the model.
         requested: Those of them that the user asked for.
         unsupported: Those of the requested that the data do not support.
@@ -289,6 +293,7 @@ class CriticismSummary(Section):
 
     verdict: VerdictKind
     effects: tuple[str, ...]
+    perhaps: tuple[str, ...]
     accepted: tuple[str, ...]
     requested: tuple[str, ...]
     unsupported: tuple[str, ...]
@@ -332,19 +337,15 @@ class CriticismSummary(Section):
         posterior, given = tree["posterior"].to_dataset(), sources.values()
         parameters = {str(name): ParameterSummary.of(of) for name, of in posterior.items()}
         verdicts = list(map(SourceVerdict.of, given))
-        verdict, effects, probability = _together(verdicts)
         accepted, requested = (tuple(tree.attrs[name]) for name in ("accepted", "requested"))
         return cls(
-            verdict=verdict,
-            effects=effects,
+            **_together(verdicts),
             accepted=accepted,
             requested=requested,
             unsupported=unsupported(sources),
             refuted=tuple(name for one in verdicts for name in one.refuted),
-            held_out=min(one.held_out for one in verdicts if one.verdict == verdict),
             reason=" ".join(source.verdict.reason for source in given),
             p_value=min(1.0, len(verdicts) * min(one.p_value for one in verdicts)),
-            probability=probability,
             where=significant_windows(sources["stirs"]),
             coefficient={name: parameters[name] for name in accepted},
             parameters=parameters,
@@ -396,11 +397,16 @@ def unsupported(sources: "Sources") -> tuple[str, ...]:
     )
 
 
-def _together(sources: list[SourceVerdict]) -> tuple[VerdictKind, tuple[str, ...], float]:
-    """One verdict on all data: what was named anywhere, or else the gravest; and the probability
-    that all sources which give it are right."""
+def _together(sources: list[SourceVerdict]) -> dict[str, Any]:
+    """Fields of the verdict on all data: what was named anywhere, or else the gravest. Sources that
+    give it are all right with the product of their probabilities."""
     given = {source.verdict for source in sources}
     verdict = next((one for one in GRAVEST_FIRST if one in given), VerdictKind.AGREEMENT)
     agreed = [source for source in sources if source.verdict == verdict]
-    effects = tuple(name for source in agreed for name in source.effects)
-    return verdict, effects, math.prod(source.probability for source in agreed)
+    return {
+        "verdict": verdict,
+        "effects": tuple(name for source in agreed for name in source.effects),
+        "perhaps": tuple(name for source in agreed for name in source.perhaps),
+        "held_out": min(source.held_out for source in agreed),
+        "probability": math.prod(source.probability for source in agreed),
+    }

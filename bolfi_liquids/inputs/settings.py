@@ -229,4 +229,4 @@ class CriticismSettings:
         """Runs of each step for pours, of which each makes the whole table."""
         from ..inference.criticism import Plan
 
-        return Plan(start=12, look=2, refit=4, refits=3)
+        return Plan(start=12, extension=4, look=2, refit=4, refits=3)

@@ -9,7 +9,7 @@ import numpy as np
 from ..prior import Prior
 from ..simulations.compute import Compute
 from .experiment import Experiment, Extensions
-from .hypothesis import Hypothesis
+from .hypothesis import Hypothesis, Weighted, weighted_posterior
 from .misfit import Check, Signature, scored_on_clean, signature
 from .runs import FIRST_HALF_WIDTH, LATER_HALF_WIDTH, PriorBox, Runs, joined, sides
 from .study import MIN_EFFECT_RUNS, AllRunsFailed, Plan, Report, Study, silent
@@ -76,11 +76,11 @@ def settled(gained: float, fitted: Hypothesis, box: PriorBox) -> bool:
 def examine(study: Study, earlier: Runs | None) -> Base:
     """Fit the base model, learn every effect's signature, and test the model.
 
-    The effects act where the base model fits best, with the same seeds: so what runs differ by
-    is their doing.
+    The effects act at draws of the base model's posterior, with the same seeds: so what runs differ
+    by is their doing, and one that needs what these data tell little of is seen, too.
     """
     base, runs, box = fit_base(study, earlier)
-    tried = _screen(study, base.best)
+    tried = _screen(study, weighted_posterior(base, study.seed))
     neutral = tried.pop("")
     known = {name: of for name, of in tried.items() if len(of) >= MIN_EFFECT_RUNS}
     runs = joined([runs, neutral])
@@ -107,18 +107,18 @@ def examine(study: Study, earlier: Runs | None) -> Base:
     )
 
 
-def _screen(study: Study, best: Mapping[str, float]) -> dict[str, Runs]:
-    """Runs at the base model's best parameters, of each effect and, under "", of none; where some
-    fail, others are made nearer to neutral."""
+def _screen(study: Study, posterior: Weighted) -> dict[str, Runs]:
+    """Runs at draws of the base model's posterior, of each effect and, under "", of none; where
+    some fail, others are made nearer to neutral."""
     count = study.plan.extension
-    at_best = {name: np.full(count, value) for name, value in best.items()}
+    drawn = posterior.draw(study.seed, count)
     found: dict[str, list[Runs]] = {name: [] for name in ("", *study.extensions)}
     for attempt, share in enumerate(SIDE_SHARES):
         lacking = [name for name, of in found.items() if sum(map(len, of)) < count]
         if attempt and not any(lacking):
             break
         asked = [
-            at_best | ({name: sides(study.extensions[name], count, share)} if name else {})
+            drawn | ({name: sides(study.extensions[name], count, share)} if name else {})
             for name in lacking
         ]
         made = study.run_each(f"effects {attempt}", asked)
@@ -362,8 +362,9 @@ class Search:
         if accepted:
             pair = max(accepted, key=lambda c: c.gain)
             alone = [self.found[(name,)] for name in pair.names]
-            short = FAR_BEHIND * pair.gain, pair.gain - SETTLED_GAIN
-            self.refit([_moved(one, pair) for one in alone if short[0] < one.gain < short[1]])
+            due = FAR_BEHIND * pair.gain, pair.gain - SETTLED_GAIN
+            short = [one for one in alone if not one.refitted or due[0] < one.gain < due[1]]
+            self.refit([_moved(one, pair) for one in short])
 
 
 def _moved(one: Candidate, pair: Candidate) -> Candidate:

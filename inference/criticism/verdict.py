@@ -129,6 +129,7 @@ class Verdict:
         probability: Probability that this conclusion is right: of effects, that they are missing,
             alone or with another; of a tie, that the right explanation is among those named.
         reason: The conclusion in a sentence.
+        perhaps: Effects that may act besides.
     """
 
     kind: VerdictKind
@@ -136,6 +137,7 @@ class Verdict:
     p_value: float
     probability: float
     reason: str
+    perhaps: tuple[str, ...] = ()
 
 
 def log_weight(one: Candidate, effects: int) -> float:
@@ -213,19 +215,23 @@ def remaining(probability: Mapping[str, float], candidates: Sequence[Candidate])
     """The credible explanations, most probable first.
 
     There are none where "none" or "none of these" is credible, where the most probable explanation
-    was not accepted, or where it is part of all of them and the held-out data show no gap.
+    was not accepted, or where the held-out data show no gap that the one to be named could explain.
     """
     by_label = {label(one.names): one for one in candidates}
     found = credible(probability)
     if not set(found) <= by_label.keys() or not by_label[found[0]].accepted:
         return []
     members = [by_label[name] for name in found]
-    return members if members[0].seen or not nested(members) else []
+    named = in_common(members)
+    return members if named is None or named.seen else []
 
 
-def nested(members: Sequence[Candidate]) -> bool:
-    """Whether the first explanation is part of all."""
-    return all(set(members[0].names) <= set(one.names) for one in members)
+def in_common(members: Sequence[Candidate]) -> Candidate | None:
+    """The accepted explanation that is a part of all of them, if there is one."""
+    for one in members:
+        if one.accepted and all(set(one.names) <= set(other.names) for other in members):
+            return one
+    return None
 
 
 def conclude(
@@ -253,18 +259,18 @@ def conclude(
         reason = differ + _unexplained(candidates, probability)
         return Verdict(VerdictKind.UNKNOWN, (), p, probability[OTHER], reason)
     reached = sum(probability[label(one.names)] for one in members)
-    names = tuple(dict.fromkeys(name for member in members for name in member.names))
-    if not nested(members):
+    named = in_common(members)
+    names = dict.fromkeys(name for one in members for name in one.names)
+    if named is None:
         tied = " or ".join(label(one.names) for one in members)
         tie = f"{tied} explains it ({_percent(reached)}), and these data do not distinguish them."
-        return Verdict(VerdictKind.TIE, names, p, reached, differ + tie)
-    named = members[0].names
-    confirmed = members[0].gaps and reached >= CERTAIN
-    explains = f"{label(named)} {'' if confirmed else 'probably '}explains it"
-    besides = " or ".join(name for name in names if name not in named)
-    perhaps = f", perhaps together with {besides}" if besides else ""
-    reason = f"{differ}{explains} ({_percent(reached)}){perhaps}."
-    return Verdict(VerdictKind.EFFECT, named, p, reached, reason)
+        return Verdict(VerdictKind.TIE, tuple(names), p, reached, differ + tie)
+    confirmed = named.gaps and reached >= CERTAIN
+    explains = f"{label(named.names)} {'' if confirmed else 'probably '}explains it"
+    perhaps = tuple(name for name in names if name not in named.names)
+    besides = f", perhaps together with {' or '.join(perhaps)}" if perhaps else ""
+    reason = f"{differ}{explains} ({_percent(reached)}){besides}."
+    return Verdict(VerdictKind.EFFECT, named.names, p, reached, reason, perhaps)
 
 
 def _unexplained(explanations: Sequence[Candidate], probability: Mapping[str, float]) -> str:

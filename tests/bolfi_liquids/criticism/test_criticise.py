@@ -115,12 +115,12 @@ def test_sources_that_agree_are_all_right_with_the_product_of_their_probabilitie
     stirs, pours, expected
 ):
     given = [
-        SourceVerdict(VerdictKind(verdict), tuple(effects), 0.5, probability, {}, {}, (), 0)
+        SourceVerdict(VerdictKind(verdict), tuple(effects), (), 0.5, probability, {}, {}, (), 0)
         for verdict, probability, *effects in (stirs, pours)
     ]
-    verdict, effects, probability = _together(given)
-    assert (verdict, effects) == expected[:2]
-    assert probability == pytest.approx(expected[2])
+    found = _together(given)
+    assert (found["verdict"], found["effects"]) == expected[:2]
+    assert found["probability"] == pytest.approx(expected[2])
 
 
 def test_a_clean_recording_that_is_criticised_or_held_out_is_no_baseline(given):

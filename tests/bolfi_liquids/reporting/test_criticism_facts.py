@@ -63,7 +63,8 @@ OWN = {"my_effect": ParameterSummary(mean=2.0, sd=0.1, q05=1.8, q50=2.0, q95=2.2
 PARTS = [
     # part, numbers of the criticism, what is said, what is not
     ("verdict", {}, ["differ", "0.002", "camera delay"], ["may be"]),
-    ("verdict", {"held_out": 0}, ["differ", "probably camera delay"], []),
+    ("verdict", {"held_out": 0}, ["differ", "probably camera delay"], ["besides"]),
+    ("verdict", {"perhaps": EFFECTS[1:]}, ["Gripper scale or stick mass may act besides"], []),
     ("verdict", TIED, ["camera delay or gripper scale", "cannot distinguish"], []),
     ("verdict", UNKNOWN, ["differ", "No known effect"], ["camera delay"]),
     ("verdict", REFUTED, ["Camera delay", "contradict"], ["No known effect"]),
@@ -157,9 +158,19 @@ def test_a_model_that_agrees_has_one_gap_and_no_gains(criticise, criticism_summa
 
 
 def test_pours_have_their_own_verdict(criticise, said, made):
-    stirs = SourceVerdict(VerdictKind.UNKNOWN, (), 0.01, 0.9, {}, {}, (), 0)
+    stirs = SourceVerdict(VerdictKind.UNKNOWN, (), (), 0.01, 0.9, {}, {}, (), 0)
     pours = PourVerdict(
-        VerdictKind.AGREEMENT, (), 0.3, 0.9, {}, {"adhesion": 0.3}, (), 0, before=0.051, after=None
+        VerdictKind.AGREEMENT,
+        (),
+        (),
+        0.3,
+        0.9,
+        {},
+        {"adhesion": 0.3},
+        (),
+        0,
+        before=0.051,
+        after=None,
     )
     tree = made(pours=True)
     of_stirs, *_ = said("criticism", tree, stirs=stirs, pours=pours)

@@ -132,7 +132,7 @@ def test_a_second_effect_must_be_worth_its_prior():
     assert verdict(alone, pairs[1])[1] == ("drag", "tilt")
 
 
-def test_an_effect_in_all_that_is_probable_is_named_alone():
+def test_what_all_probable_explanations_have_in_common_is_named():
     """What is then not known is whether another acts, too."""
     alone = candidate("drag", gain=20.0)
     both = candidate("drag", "tilt", gain=20.5)
@@ -141,7 +141,9 @@ def test_an_effect_in_all_that_is_probable_is_named_alone():
     told = concluded(alone, both)
     assert (told.kind, told.effects) == ("effect", ("drag",)) and "tilt" in told.reason
     assert told.probability == pytest.approx(found["drag"] + found["drag with tilt"])
-    assert verdict(alone, replace(both, gain=23.0)) == ("tie", ("drag", "tilt"))
+    assert verdict(alone, replace(both, gain=23.0)) == ("effect", ("drag",))
+    assert verdict(alone, replace(both, gain=26.0)) == ("effect", ("drag", "tilt"))
+    assert verdict(replace(alone, refitted=False), replace(both, gain=23.0))[0] == "unknown"
 
 
 def test_probabilities_are_those_of_bayes_rule():
