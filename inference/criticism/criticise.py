@@ -172,12 +172,12 @@ def criticise(  # noqa: PLR0913  the one call that most users make
 
     The base model is fitted and its residual tested (`misfit`). If its p-value is below `level`,
     every effect is fitted together with the base parameters. The best are simulated where they fit
-    best and fitted again; where none of them passes the test that the base model failed, pairs are
-    tried. What passes predicts the held-out data. All data together give each explanation, "none"
-    and "none of these" a probability (`verdict`). The verdict names the smallest set of
-    explanations that holds the right one with a probability of 0.9: one is an effect, several are
-    a tie. The most probable must have passed; on held-out data it must leave no more than noise,
-    explain most of the gap and predict better than the base model.
+    best and fitted again, and so are pairs that may be nearly as probable. What passes the test that
+    the base model failed predicts the held-out data. All data together give each explanation,
+    "none" and "none of these" a probability (`verdict`). The smallest set of explanations that
+    holds the right one with a probability of 0.9 remains: what all of them have in common is an
+    effect, else they are a tie. The most probable must have passed; on held-out data it must leave
+    no more than noise, explain most of the gap and predict better than the base model.
 
     All runs are kept in the bank under seeds that derive from one: the same call repeats
     nothing that was finished and concludes the same.
