@@ -100,9 +100,10 @@ def design_stir(
             fitted = stir_experiment(stirring, camera_noise(run.recordings), None, "stir")
             study = Study(fitted, run.prior, {}, own, seed=seed, report=report)
             proposals = list(_proposals(study, stirring, motions, middle))
-            found = suggest(study, proposals, _rivals(posterior, middle, apart, seed))
+            found, not_made = suggest(study, proposals, _rivals(posterior, middle, apart, seed))
         if not found:
-            raise RuntimeError(f"{run.path}: none of the proposed stirs could be simulated")
+            why = next(iter(not_made.values()))
+            raise RuntimeError(f"{run.path}: no proposed stir could be simulated; {why}")
         best = found[0]
         motion = {one.label: asdict(one) for one in motions}.get(best.label)
         keep_motion(run.path / FILE, motion)

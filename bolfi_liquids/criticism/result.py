@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..calibration.result import Calibration
 from ..drawing import shown
 from ..errors import InputError
-from ..inference.criticism.verdict_kind import VerdictKind
+from ..inference.criticism.verdict_kind import VerdictKind, advice
 from ..inputs.prior import PARAMETERS
 from ..run.run import RESULTS, Run, RunOrPath
 from ..wording import html_table, spoken
@@ -54,7 +54,7 @@ class Criticism:
         }
         if self.effects and not self.summary.coefficient:
             rows["effects"] = ", ".join(map(spoken, self.effects))
-        return html_table("Criticism", rows | {"next": self.verdict.advice})
+        return html_table("Criticism", rows | {"next": self.advice})
 
     @classmethod
     def open(cls, run: RunOrPath) -> "Criticism":
@@ -86,6 +86,12 @@ class Criticism:
     def verdict(self) -> VerdictKind:
         """The conclusion; equal to "none", "effect", "tie" or "unknown"."""
         return self.summary.verdict
+
+    @property
+    def advice(self) -> str:
+        """What to do next."""
+        confirmed, suggested = self.summary.held_out > 0, bool(self.summary.suggestions)
+        return advice(self.verdict, confirmed=confirmed, suggested=suggested)
 
     @property
     def effects(self) -> tuple[str, ...]:

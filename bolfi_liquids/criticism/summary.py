@@ -35,7 +35,7 @@ class SourceVerdict:
     Attributes:
         verdict: The conclusion.
         effects: What it names: the effect, or those that are tied.
-        perhaps: Effects that may act besides.
+        perhaps: Effects that may act besides, and the probability that they do.
         p_value: Of the base model.
         probability: That the verdict is right.
         probabilities: Of "none", of each explanation and of "none of these".
@@ -47,7 +47,7 @@ class SourceVerdict:
 
     verdict: VerdictKind
     effects: tuple[str, ...]
-    perhaps: tuple[str, ...]
+    perhaps: Mapping[str, Number]
     p_value: Number
     probability: Number
     probabilities: Mapping[str, Number]
@@ -63,7 +63,7 @@ class SourceVerdict:
         return cls(
             VerdictKind(verdict.kind),
             tuple(verdict.effects),
-            verdict.perhaps,
+            dict(verdict.perhaps),
             verdict.p_value,
             verdict.probability,
             dict(source.probabilities),
@@ -263,7 +263,7 @@ class CriticismSummary(Section):
     Attributes:
         verdict: On all data together.
         effects: What it names: the effect, or those that are tied.
-        perhaps: Effects that may act besides.
+        perhaps: Effects that may act besides, and the probability that they do.
         accepted: Effects that joined the model.
         requested: Those of them that the user asked for.
         unsupported: Those of the requested that the data do not support.
@@ -293,7 +293,7 @@ class CriticismSummary(Section):
 
     verdict: VerdictKind
     effects: tuple[str, ...]
-    perhaps: tuple[str, ...]
+    perhaps: Mapping[str, Number]
     accepted: tuple[str, ...]
     requested: tuple[str, ...]
     unsupported: tuple[str, ...]
@@ -406,7 +406,7 @@ def _together(sources: list[SourceVerdict]) -> dict[str, Any]:
     return {
         "verdict": verdict,
         "effects": tuple(name for source in agreed for name in source.effects),
-        "perhaps": tuple(name for source in agreed for name in source.perhaps),
+        "perhaps": {name: p for source in agreed for name, p in source.perhaps.items()},
         "held_out": min(source.held_out for source in agreed),
         "probability": math.prod(source.probability for source in agreed),
     }

@@ -252,7 +252,7 @@ def _verdict(data: str, found: CriticismSummary | SourceVerdict) -> Facts:
         "p": f"{found.p_value:.2g}",
         "probability": percent(stated) if stated < MAX_STATED else "over 99 %",
         "effects": _spoken(found.effects),
-        "perhaps": _spoken(found.perhaps),
+        "perhaps": [f"{spoken(name)} ({percent(p)})" for name, p in found.perhaps.items()],
         "confirmed": found.held_out > 0,
         "certain": found.held_out > 0 and found.probability >= CERTAIN,
         "refuted": _spoken(found.refuted),

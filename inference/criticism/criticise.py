@@ -22,15 +22,8 @@ from .misfit import Found, confusion, locate, null_draws
 from .power import Sensitivity, sensitivity
 from .search import Base, examine, explain, unsought
 from .study import AllRunsFailed, Plan, Report, Study, silent
-from .verdict import (
-    REJECTION_LEVEL,
-    Candidate,
-    Verdict,
-    VerdictKind,
-    conclude,
-    probabilities,
-    remaining,
-)
+from .verdict import REJECTION_LEVEL, Candidate, Verdict, conclude, probabilities, remaining
+from .verdict_kind import VerdictKind, advice
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -48,7 +41,8 @@ class Criticism(Displayed):
         before, after: Where the data disagree with the base and with the extended model.
         suggestions: Experiments that would separate explanations, best first.
         untested: Effects that were not refitted, or could not be simulated, here or for the
-            held-out data, though they might explain the difference: name -> why.
+            held-out data, though they might explain the difference, and proposals that could not
+            be simulated: name -> why.
         experiment: The data, their noise and the simulator.
         units: Of the effects' coefficients.
         tied: Names of each explanation that remains, best first.
@@ -81,20 +75,33 @@ class Criticism(Displayed):
             (name, f"{one.mean:.3g} [{one.q05:.3g}, {one.q95:.3g}] {self.units[name]}".rstrip())
             for name, one in self.coefficients.items()
         ]
+        agrees = self.verdict.kind is VerdictKind.AGREEMENT
+        limits = {name: one.limit for name, one in self.sensitivities.items() if agrees}
+        hidden = ", ".join(
+            f"{name} {size:.3g} {self.units[name]}".rstrip() for name, size in limits.items()
+        )
         untested = [("not tested", f"{name} ({why})") for name, why in self.untested.items()]
         inert = ", ".join(self.base.inert)
         suggested = [("suggested experiment", str(one.label)) for one in self.suggestions[:1]]
         return [
             ("verdict", self.verdict.reason),
-            ("next", self.verdict.kind.advice),
+            ("next", self.advice),
             ("accepted", ", ".join(self.accepted) or "none"),
             *sizes,
             ("explanations tested", str(len(self.candidates))),
+            *([("could hide", hidden)] if hidden else []),
             *untested,
             *([("changed no signal", f"{inert}; does the simulator read it?")] if inert else []),
             *suggested,
             ("simulations", str(self.simulations)),
         ]
+
+    @property
+    def advice(self) -> str:
+        """What to do next."""
+        leading = self.leading
+        confirmed = leading is not None and bool(leading.gaps) and leading.accepted
+        return advice(self.verdict.kind, confirmed=confirmed, suggested=bool(self.suggestions))
 
     @property
     def coefficients(self) -> dict[str, Interval]:
@@ -172,8 +179,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
 
     The base model is fitted and its residual tested (`misfit`). If its p-value is below `level`,
     every effect is fitted together with the base parameters. The best are simulated where they fit
-    best and fitted again, and so are pairs that may be nearly as probable. What passes the test that
-    the base model failed predicts the held-out data. All data together give each explanation,
+    best and fitted again, and so are pairs that may be nearly as probable. What passes the test
+    that the base model failed predicts the held-out data. All data together give each explanation,
     "none" and "none of these" a probability (`verdict`). The smallest set of explanations that
     holds the right one with a probability of 0.9 remains: what all of them have in common is an
     effect, else they are a tie. The most probable must have passed; on held-out data it must leave
@@ -210,6 +217,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     check_kind("experiment", experiment, Experiment)
     _check_others("held_out", held_out, Experiment)
     _check_others("proposals", proposals, Proposal)
+    for one in (experiment, *held_out):
+        one.check_noise()
     for one in held_out:
         if np.array_equal(one.observed, experiment.observed, equal_nan=True):
             raise ValueError(
@@ -235,6 +244,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
 
     with open_compute(executor, timeout, batch, bank) as compute:
         study = Study(experiment, prior, extensions, compute, plan or Plan(), seed, counted)
+        for one in held_out:
+            study.try_elsewhere(one)
         base = examine(study, None if earlier is None else study.table(*earlier))
         sought, asked = [], None
         if accept is not None or base.check.p_value < level:
@@ -245,7 +256,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         members = remaining(probability, sought)
         rivals = _rivals(verdict, sought, members)
         known = rivals_of(rivals, probability, seed) if proposals else {}
-        suggestions = suggest(study, proposals, known)
+        suggestions, not_made = suggest(study, proposals, known)
     named = verdict.effects if verdict.kind is VerdictKind.EFFECT else ()
     accepted = tuple(accept) if accept is not None else named
     leading = asked or _among(sought, accepted)
@@ -267,7 +278,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         before=tuple(locate(base.hypothesis, experiment.windows, base.null)),
         after=tuple(left),
         suggestions=tuple(suggestions),
-        untested=base.untested | _left_out(candidates),
+        untested=base.untested | _left_out(candidates) | not_made,
         experiment=concluded,
         units={name: one.unit for name, one in extensions.items()},
         tied=tuple(one.names for one in members if verdict.kind is not VerdictKind.AGREEMENT),
@@ -302,7 +313,7 @@ def _rivals(
     verdict: Verdict, candidates: Sequence[Candidate], members: Sequence[Candidate]
 ) -> list[Candidate]:
     """Explanations that a further experiment should tell apart."""
-    if verdict.kind is VerdictKind.TIE:
+    if len(members) > 1:
         return list(members)
     if verdict.kind is VerdictKind.UNKNOWN:
         return sorted(candidates, key=lambda c: -c.gain)[:2]

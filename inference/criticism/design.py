@@ -72,22 +72,24 @@ def rivals_of(
 
 def suggest(
     study: Study, proposals: Sequence[Proposal], rivals: Mapping[str, Rival]
-) -> list[Suggestion]:
-    """The best proposals, best first.
+) -> tuple[list[Suggestion], dict[str, str]]:
+    """The best proposals, best first, and why others could not be simulated.
 
     Each is simulated once with every rival, the best `FINALISTS` with all draws (sequential
     halving, Karnin et al. 2013, of two rounds). One that cannot be simulated for each of the rivals
-    is left out. A run of each rival has the same seed, so what they differ by is not chance.
+    is left out: label -> why. A run of each rival has the same seed, so what they differ by is not
+    chance.
     """
     if len(rivals) < 2:
-        return []
-    first = [(one, _simulated(study, one, rivals, slice(0, 1))) for one in proposals]
-    found = [(one, runs, assess(one, rivals, runs)) for one, runs in first if runs.size]
+        return [], {}
+    first = [(one, *_simulated(study, one, rivals, slice(0, 1))) for one in proposals]
+    found = [(one, runs, assess(one, rivals, runs)) for one, runs, _ in first if runs.size]
+    not_made = {one.label: error for one, runs, error in first if not runs.size}
     finalists = []
     for one, runs, _ in sorted(found, key=lambda of: rank(of[2]))[:FINALISTS]:
-        more = _simulated(study, one, rivals, slice(1, None))
+        more, _ = _simulated(study, one, rivals, slice(1, None))
         finalists.append(assess(one, rivals, np.concatenate([runs, more], axis=1)))
-    return sorted(finalists, key=rank)
+    return sorted(finalists, key=rank), not_made
 
 
 def rank(suggestion: Suggestion) -> tuple[float, float]:
@@ -97,8 +99,9 @@ def rank(suggestion: Suggestion) -> tuple[float, float]:
 
 def _simulated(
     study: Study, proposal: Proposal, rivals: Mapping[str, Rival], draws: slice
-) -> np.ndarray:
-    """Runs [rivals, n, values] of those draws that can be simulated for each of the rivals."""
+) -> tuple[np.ndarray, str]:
+    """Runs [rivals, n, values] of those draws that can be simulated for each of the rivals, and the
+    first error of others."""
     thetas = [{name: of[draws] for name, of in one.theta.items()} for one in rivals.values()]
     again = ", again" if draws.start else ""
     phase = f"next {proposal.label}{again}"  # proposals may share a simulator's identity
@@ -106,9 +109,8 @@ def _simulated(
     common = set.intersection(*(set(runs.seeds.tolist()) for runs in made))
     rows = [[seed in common for seed in runs.seeds.tolist()] for runs in made]
     values = int(np.prod(proposal.shape))
-    return np.stack(
-        [runs.signals[row].reshape(-1, values) for runs, row in zip(made, rows, strict=True)]
-    )
+    signals = [runs.signals[row].reshape(-1, values) for runs, row in zip(made, rows, strict=True)]
+    return np.stack(signals), next((runs.error for runs in made if runs.error), "")
 
 
 @in_float64

@@ -79,6 +79,17 @@ class Experiment:
                 )
         object.__setattr__(self, "observed", observed)
 
+    def check_noise(self) -> None:
+        """Raise ValueError unless the noise can be drawn for these data."""
+        try:
+            self.noise.draw(np.random.default_rng(0), samples(self.observed), 1)
+        except (ValueError, IndexError) as err:
+            raise ValueError(
+                f"{self.label}: the noise does not fit observed of the shape {self.shape}, of which "
+                f"{np.isfinite(self.observed).sum()} are finite ({err}); give an sd as a "
+                "number, or one for each finite value"
+            ) from err
+
     @property
     def shape(self) -> tuple[int, ...]:
         """Shape of the output."""

@@ -57,7 +57,8 @@ class CleanData:
         residual = checked_array("residual", self.residual)
         if residual.ndim != 2 or np.isinf(residual).any() or not np.isfinite(residual).any():
             raise ValueError(
-                "residual must have the shape [T, channels], be finite somewhere and infinite "
+                "residual must have the shape [T, channels] (one channel: [:, None]), be finite "
+                "somewhere and infinite "
                 f"nowhere (NaN is a missing sample), got {self.residual!r:.100}"
             )
         check_noise("noise", self.noise)

@@ -100,6 +100,20 @@ class Study:
             raise AllRunsFailed(made.error)
         return made
 
+    def try_elsewhere(self, other: Experiment) -> None:
+        """Simulate another experiment once, in the middle of the prior, before any run is wasted.
+
+        Raises:
+            AllRunsFailed: that failed, and so did three more runs.
+        """
+        middle = self.prior.from_unit(np.full((1, len(self.prior)), 0.5))
+        for phase, count in ((f"try {other.label}", 1), (f"try {other.label} again", 3)):
+            theta = {name: np.repeat(value, count) for name, value in middle.items()}
+            (made,) = self.run_each(phase, [theta], other)
+            if len(made):
+                return
+        raise AllRunsFailed(f"the held-out data {other.label!r} cannot be simulated: {made.error}")
+
     def run_each(
         self,
         phase: str,

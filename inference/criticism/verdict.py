@@ -14,7 +14,7 @@ costs least.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import comb
 
 import numpy as np
@@ -129,7 +129,7 @@ class Verdict:
         probability: Probability that this conclusion is right: of effects, that they are missing,
             alone or with another; of a tie, that the right explanation is among those named.
         reason: The conclusion in a sentence.
-        perhaps: Effects that may act besides.
+        perhaps: Effects that may act besides, and the probability that they do.
     """
 
     kind: VerdictKind
@@ -137,7 +137,7 @@ class Verdict:
     p_value: float
     probability: float
     reason: str
-    perhaps: tuple[str, ...] = ()
+    perhaps: Mapping[str, float] = field(default_factory=dict)
 
 
 def log_weight(one: Candidate, effects: int) -> float:
@@ -267,8 +267,13 @@ def conclude(
         return Verdict(VerdictKind.TIE, tuple(names), p, reached, differ + tie)
     confirmed = named.gaps and reached >= CERTAIN
     explains = f"{label(named.names)} {'' if confirmed else 'probably '}explains it"
-    perhaps = tuple(name for name in names if name not in named.names)
-    besides = f", perhaps together with {' or '.join(perhaps)}" if perhaps else ""
+    perhaps = {
+        name: sum(probability[label(one.names)] for one in members if name in one.names)
+        for name in names
+        if name not in named.names
+    }
+    each = " or ".join(f"{name} ({_percent(share)})" for name, share in perhaps.items())
+    besides = f", perhaps together with {each}" if perhaps else ""
     reason = f"{differ}{explains} ({_percent(reached)}){besides}."
     return Verdict(VerdictKind.EFFECT, named.names, p, reached, reason, perhaps)
 

@@ -15,19 +15,25 @@ class VerdictKind(StrEnum):
     TIE = "tie"
     UNKNOWN = "unknown"
 
-    @property
-    def advice(self) -> str:
-        """Its meaning, and what to do next."""
-        return _ADVICE[self]
 
+def advice(kind: VerdictKind, *, confirmed: bool, suggested: bool) -> str:
+    """What to do next.
 
-_ADVICE = {
-    VerdictKind.AGREEMENT: "No missing effect was detected. The SNR of an effect shows whether "
-    "these data could have revealed it.",
-    VerdictKind.EFFECT: "The named effect explains the difference. Use the extended model, and "
-    "confirm the effect on held-out data.",
-    VerdictKind.TIE: "Several effects explain the data equally well. Make the suggested experiment "
-    "and criticise again.",
-    VerdictKind.UNKNOWN: "Model and data differ and no known effect explains it. Look where they "
-    "differ, and add an extension that acts there.",
-}
+    Args:
+        kind: Of the verdict.
+        confirmed: Whether the explanation holds on held-out data.
+        suggested: Whether further experiments are suggested.
+    """
+    if kind is VerdictKind.AGREEMENT:
+        return "Look whether the sizes that could hide (`sensitivities`) matter to you."
+    if kind is VerdictKind.UNKNOWN:
+        return "Look where model and data differ, and add an extension that acts there."
+    if kind is VerdictKind.TIE:
+        return (
+            "Make the suggested experiment and criticise again."
+            if suggested
+            else "Make an experiment that separates them, and criticise again with it held out."
+        )
+    return "Use the extended model." + (
+        "" if confirmed else " Confirm it on held-out data before you trust it."
+    )

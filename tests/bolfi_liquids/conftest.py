@@ -132,7 +132,7 @@ def criticism_summary():
     stroke = {"channel": "xz", "start_s": 1.0, "stop_s": 2.0, "stroke": 1}
     shares = {"none": 0.01, "camera_delay": 0.97, "none of these": 0.02}
     verdict = SourceVerdict(
-        VerdictKind.EFFECT, ("camera_delay",), (), 0.002, 0.97, shares, {}, (), 1
+        VerdictKind.EFFECT, ("camera_delay",), {}, 0.002, 0.97, shares, {}, (), 1
     )
     alone = ("probabilities", "limits")  # of a source
     common = {key: of for key, of in vars(verdict).items() if key not in alone}

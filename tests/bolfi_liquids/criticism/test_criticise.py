@@ -115,7 +115,7 @@ def test_sources_that_agree_are_all_right_with_the_product_of_their_probabilitie
     stirs, pours, expected
 ):
     given = [
-        SourceVerdict(VerdictKind(verdict), tuple(effects), (), 0.5, probability, {}, {}, (), 0)
+        SourceVerdict(VerdictKind(verdict), tuple(effects), {}, 0.5, probability, {}, {}, (), 0)
         for verdict, probability, *effects in (stirs, pours)
     ]
     found = _together(given)

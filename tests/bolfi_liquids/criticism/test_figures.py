@@ -122,4 +122,4 @@ def test_a_criticism_shows_what_it_holds(criticism_summary, made):
         for part in ("mine", "effect", "0.002"):
             assert part in shown
     assert "<mine>" not in criticism._repr_html_()
-    assert criticism.verdict == "effect" and criticism.verdict.advice
+    assert criticism.verdict == "effect" and criticism.advice

@@ -64,7 +64,7 @@ PARTS = [
     # part, numbers of the criticism, what is said, what is not
     ("verdict", {}, ["differ", "0.002", "camera delay"], ["may be"]),
     ("verdict", {"held_out": 0}, ["differ", "probably camera delay"], ["besides"]),
-    ("verdict", {"perhaps": EFFECTS[1:]}, ["Gripper scale or stick mass may act besides"], []),
+    ("verdict", {"perhaps": {"stick_mass": 0.2}}, ["Stick mass (20 %) may act besides"], []),
     ("verdict", TIED, ["camera delay or gripper scale", "cannot distinguish"], []),
     ("verdict", UNKNOWN, ["differ", "No known effect"], ["camera delay"]),
     ("verdict", REFUTED, ["Camera delay", "contradict"], ["No known effect"]),
@@ -158,11 +158,11 @@ def test_a_model_that_agrees_has_one_gap_and_no_gains(criticise, criticism_summa
 
 
 def test_pours_have_their_own_verdict(criticise, said, made):
-    stirs = SourceVerdict(VerdictKind.UNKNOWN, (), (), 0.01, 0.9, {}, {}, (), 0)
+    stirs = SourceVerdict(VerdictKind.UNKNOWN, (), {}, 0.01, 0.9, {}, {}, (), 0)
     pours = PourVerdict(
         VerdictKind.AGREEMENT,
         (),
-        (),
+        {},
         0.3,
         0.9,
         {},

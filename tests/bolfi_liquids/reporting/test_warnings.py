@@ -89,7 +89,7 @@ def warned(calibration, criticism_summary, made):
 CONTRADICTION = GivenPour(2, 30.0, 1.2, 0.127, 0.02, 0.001, 0.02)
 GIVEN = GivenSummary("oil.csv", "0", "", (2,), (CONTRADICTION,), CONTRADICTION, ACTION)
 UNEXPLAINED = PourVerdict(
-    VerdictKind.UNKNOWN, (), (), 0.003, 0.9, {}, {}, (), 0, before=0.4, after=None
+    VerdictKind.UNKNOWN, (), {}, 0.003, 0.9, {}, {}, (), 0, before=0.4, after=None
 )
 OLD = "pour.nc is older; make it again: bolfi-liquids pour RUN"
 

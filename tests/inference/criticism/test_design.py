@@ -107,7 +107,7 @@ def test_the_best_of_linear_experiments_is_that_in_which_the_parameter_absorbs_n
     """Both are as far apart at the best parameters, 6 times the noise. Along the wave of a
     parameter that is known to 3 times the noise, 6 / sqrt(1 + 3^2) is left of it."""
     along, across = linear(0.0), linear(np.pi / 2.0)
-    first, second = suggest(study, [along, across], RIVALS)
+    (first, second), _ = suggest(study, [along, across], RIVALS)
     assert (first.label, second.label) == (across.label, along.label)
     assert second.snr < 3.0 and second.error > 0.1
     assert first.snr == pytest.approx(6.0, rel=0.15)
@@ -129,10 +129,11 @@ def test_only_the_best_get_further_runs(study):
     dead = criticism.Proposal(
         lambda theta, seeds: None, criticism.KnownNoise(SD), (SAMPLES,), "dead", "dead"
     )
-    found = suggest(study, [dead, *map(linear, (0.1, 0.4, 0.9, 1.3))], weak)
+    found, _ = suggest(study, [dead, *map(linear, (0.1, 0.4, 0.9, 1.3))], weak)
     assert len(found) == 2 and sum(done for _, done, _ in counted) <= 2 * (5 + 2 * 2)
-    assert suggest(study, [linear(0.4)], {"none": known["none"]}) == []
-    assert suggest(study, [dead], known) == []
+    assert suggest(study, [linear(0.4)], {"none": known["none"]}) == ([], {})
+    nothing, not_made = suggest(study, [dead], known)
+    assert nothing == [] and list(not_made) == ["dead"]
 
 
 def test_a_parameter_is_known_better_by_what_an_experiment_separates():

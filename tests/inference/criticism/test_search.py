@@ -366,10 +366,11 @@ def test_an_experiment_is_as_good_as_the_pair_that_it_separates_least(study):
     """A delay and the phase that equals it at speed 1, against an offset. One that cannot be
     simulated is not suggested; a single explanation needs none."""
     dead = criticism.Proposal(lambda theta, seeds: None, NOISE, (60,), "dead", "dead")
-    fast, again = suggest(study, [dead, proposal(1.0), proposal(2.0)], RIVALS)
+    (fast, again), not_made = suggest(study, [dead, proposal(1.0), proposal(2.0)], RIVALS)
+    assert list(not_made) == ["dead"] and "failed" in not_made["dead"]
     assert (fast.label, again.label) == ("speed 2.0", "speed 1.0")
     assert again.between == ("delay", "phase") and again.snr < 3.0 < fast.snr
     unlike = {name: RIVALS[name] for name in ("phase", "offset")}
-    (alone,) = suggest(study, [proposal(1.0)], unlike)
+    (alone,), _ = suggest(study, [proposal(1.0)], unlike)
     assert alone.between == ("phase", "offset") and alone.snr > 3.0
-    assert suggest(study, [proposal(1.0)], {"delay": RIVALS["delay"]}) == []
+    assert suggest(study, [proposal(1.0)], {"delay": RIVALS["delay"]}) == ([], {})
