@@ -80,7 +80,7 @@ PARTS = [
     ("baseline", {"baseline_left_out": ("stir.nc",)}, ["2 clean", "stir.nc"], ["--baseline"]),
     ("where", {}, ["stroke 1, xz plane, 1.0 to 2.0 s (1-first.nc): 2.50°", "at 0 to 3 cm/s"], []),
     ("where", {"where": ()}, ["No single"], []),
-    ("detectable", {}, ["camera delay (14), gripper scale (4)"], ["stick mass"]),
+    ("detectable", {}, ["would show", "camera delay (14), gripper scale (4)"], ["stick mass"]),
     ("undetectable", {"untested": ("gripper_scale",)}, ["stick mass", "Untested: gripper"], []),
     ("next", TIED, ["record the star (9 s)", "5.5", "40 % to 2 %", "next_stir.toml"], []),
     ("next", TIED | {"suggestions": (CIRCLES,)}, ["None", "four circles", "1.0"], ["record"]),
