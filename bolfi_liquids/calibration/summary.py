@@ -119,8 +119,8 @@ class CalibrationSummary(Section):
         seconds: Time spent.
         seed: Of all random draws.
         version: Of this package.
-        model_error_deg: RMS error of the simulator that the intervals allow for [deg]: learned, or the
-            usual one at the viscosity that fitted best before the check; 0 with the paper's
+        model_error_deg: RMS error of the simulator that the intervals allow for [deg]: learned, or
+            the usual one at the viscosity that fitted best before the check; 0 with the paper's
             surrogate.
         clean: Names of the recordings from which it was learned.
         confirmed: Whether simulations at posterior draws left the posterior where it was.

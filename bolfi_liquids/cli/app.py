@@ -196,8 +196,9 @@ def criticise(  # noqa: PLR0913  an option each
 def design(run: RunArgument, compute: ComputeOptions) -> None:
     """Find the next stir that tells most of the liquid.
 
-    RUN/design_stir.toml gets its motion, for `record --motion`. If an effect is missing,
-    `criticise` finds the stir that tells which.
+    RUN/design_stir.toml gets its motion, for `record --motion`. There is no such file where the
+    recorded stir is best again. If an effect is missing, `criticise` finds the stir that tells
+    which.
     """
     from ..next_stir import design_stir
 
