@@ -51,6 +51,7 @@ REFUSED = {
     "simulate pour --distance 300": "--distance: 300 cm;",
     "simulate pour --viscosity 1e999": "--viscosity: inf;",
     "simulate pour --out a.csv": "a.csv: ends in '.csv'",
+    "simulate stir --effect stick_mass=-1": "--effect stick_mass=-1: -1.0 is no coefficient",
     "simulate stir --effect stick_mass=1_1": "--effect stick_mass=1_1: '1_1'",
     "simulate stir --out run.nc --seed 2147483648": "--seed: 2147483648;",
     "simulate stir --movie a.avi": "a.avi: unknown kind of movie",
