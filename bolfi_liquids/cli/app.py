@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
+from ..errors import InputError
 from ..guide import PAGES, for_terminal
 from ..inputs.settings import (
     BaselineSettings,
@@ -253,9 +254,10 @@ def pour(  # noqa: PLR0913  an option each
     check_needed(ctx, "--execute", *EXECUTION)
     if execute:
         if typed := set(typed_options(ctx)) - {"--execute", *EXECUTION}:
-            raise typer.BadParameter(
-                f"{', '.join(sorted(typed))}: of the choice of a pour, which is made without "
-                "--execute; with it the pour is carried out that RUN has chosen already"
+            raise InputError(
+                "of the choice of a pour, and --execute carries out what RUN has chosen already",
+                where=", ".join(sorted(typed)),
+                fix="choose without --execute first",
             )
         check_one(ctx, "--arm", "--emulator")
         cli_record.execute(run, rig, arm=arm, emulate=emulator, despite_bad_fit=despite_bad_fit)
