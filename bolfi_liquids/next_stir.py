@@ -50,7 +50,8 @@ class NextStir:
         cost: Its duration [s].
         sd_before, sd_after: Of the log of the viscosity, now and expected after it. The simulator's
             errors in the new stir count as independent of those in earlier ones.
-        motion: RUN/design_stir.toml; None where the same stir again is best.
+        motion: RUN/design_stir.toml; None where the same stir again is best, for a recording does
+            not hold its plan.
     """
 
     label: str
@@ -68,7 +69,7 @@ def design_stir(
     timeout: float | None = None,
     progress: bool = True,
 ) -> NextStir:
-    """Find the motion that tells most of the liquid's viscosity, and write it into the run.
+    """Find the stir that tells most of the liquid's viscosity; a new motion is kept in the run.
 
     Args:
         calibration: Of stirs, or its RUN directory; effects that a criticism accepted count. A bad

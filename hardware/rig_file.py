@@ -20,7 +20,7 @@ from .errors import RigError
 from .motion.kinematics import forward, inverse
 from .motion.poses import cup_frame, rotation_matrix
 from .motion.stir_paths import above_cup
-from .rig import CHECK_ENDS, MIN_CUP_RADIUS, MOTION_FIELDS, Camera, Rig, StirringSettings
+from .rig import CHECK_ENDS, MIN_CUP_RADIUS, MOTION_FIELDS, Camera, Rig
 from .safety.limits import MAX_TILT, Workspace, workspace
 
 BUNDLED = "rig.toml"
@@ -66,11 +66,11 @@ def with_motion(rig: Rig, path: str | Path) -> Rig:
     checked_rig(rig)  # its own faults are not the file's
     written = _read(path, "motion file")
     for name in written:
-        if name in StirringSettings.model_fields and name not in MOTION_FIELDS:
+        if name not in MOTION_FIELDS:
             raise RigError(
-                "is a field of the place, not of a motion",
-                where=f"{path}: stirring.{name}",
-                fix=f"leave it out, rig.toml has it; a motion has {', '.join(MOTION_FIELDS)}",
+                "is no field of a motion",
+                where=f"{path}: {name}",
+                fix=f"a motion has {', '.join(MOTION_FIELDS)}, at the file's top without a heading",
             )
     stirring = rig.stirring.model_dump() | written
     return _checked(rig.model_dump() | {"stirring": stirring}, str(path)).stirred_by(str(path))

@@ -79,7 +79,7 @@ class Effect:
         if not (isinstance(self.name, str) and self.name.isidentifier()):
             yield "name must be an identifier"
         if self.name in FIELDS:
-            yield f"name is taken by a liquid's {self.name}"
+            yield f"name is taken by a liquid's {self.name}; choose another"
         for field in ("unit", "text", "source"):
             value = getattr(self, field)
             if not (isinstance(value, str) and value.strip()):

@@ -119,8 +119,9 @@ class CalibrationSummary(Section):
         seconds: Time spent.
         seed: Of all random draws.
         version: Of this package.
-        model_error_deg: RMS error of the simulator that the intervals allow for [deg]; 0 with the
-            paper's surrogate.
+        model_error_deg: RMS error of the simulator that the intervals allow for [deg]: learned, or
+            the usual one at the viscosity that fitted best before the check; 0 with the paper's
+            surrogate.
         clean: Names of the recordings from which it was learned.
         confirmed: Whether simulations at posterior draws left the posterior where it was.
         frame_faults: Recordings whose inclination and positions are not told in one frame, and how

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
+from ..errors import InputError
 from ..guide import PAGES, for_terminal
 from ..inputs.settings import (
     BaselineSettings,
@@ -196,8 +197,9 @@ def criticise(  # noqa: PLR0913  an option each
 def design(run: RunArgument, compute: ComputeOptions) -> None:
     """Find the next stir that tells most of the liquid.
 
-    RUN/design_stir.toml gets its motion, for `record --motion`. If an effect is missing,
-    `criticise` finds the stir that tells which.
+    RUN/design_stir.toml gets its motion, for `record --motion`. There is no such file where the
+    recorded stir is best again. If an effect is missing, `criticise` finds the stir that tells
+    which.
     """
     from ..next_stir import design_stir
 
@@ -252,9 +254,10 @@ def pour(  # noqa: PLR0913  an option each
     check_needed(ctx, "--execute", *EXECUTION)
     if execute:
         if typed := set(typed_options(ctx)) - {"--execute", *EXECUTION}:
-            raise typer.BadParameter(
-                f"{', '.join(sorted(typed))}: of the choice of a pour, which is made without "
-                "--execute; with it the pour is carried out that RUN has chosen already"
+            raise InputError(
+                "of the choice of a pour, and --execute carries out what RUN has chosen already",
+                where=", ".join(sorted(typed)),
+                fix="choose without --execute first",
             )
         check_one(ctx, "--arm", "--emulator")
         cli_record.execute(run, rig, arm=arm, emulate=emulator, despite_bad_fit=despite_bad_fit)

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from ..errors import InputError
 from ..wording import command
 from .options import examples
 
@@ -40,7 +41,9 @@ def import_table(
         typer.echo(f"{written}: change it, then: {then}")
         return
     if table is None or columns is None:
-        raise typer.BadParameter("give TABLE and --columns FILE, or --template FILE")
+        missing = "TABLE" if table is None else "--columns"
+        fix = "give TABLE and --columns FILE, or --template FILE"
+        raise InputError("is missing", where=missing, fix=fix)
     table = existing_file(table)
     recording = run_import(table, columns, table.with_suffix(".nc") if out is None else out)
     typer.echo(outline(recording))

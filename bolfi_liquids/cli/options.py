@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin,
 import typer
 from pydantic.fields import FieldInfo
 
+from ..errors import InputError
 from ..inputs.settings import CalibrationSettings, checked, helped
 
 if TYPE_CHECKING:
@@ -120,13 +121,17 @@ def check_needed(ctx: typer.Context, needed: str, *options: str) -> None:
     typed = typed_options(ctx)
     for option in options:
         if option in typed and needed not in typed:
-            raise typer.BadParameter(f"{option} needs {needed}, which is missing")
+            raise InputError(
+                f"needs {needed}, which is missing",
+                where=option,
+                fix=f"give {needed}, or leave {option} out",
+            )
 
 
 def check_one(ctx: typer.Context, one: str, other: str) -> None:
     """Refuse two options that exclude each other."""
     if {one, other} <= set(typed_options(ctx)):
-        raise typer.BadParameter(f"{one} and {other} exclude each other: give one")
+        raise InputError(f"excludes {other}", where=one, fix="give one of both")
 
 
 @checked()
@@ -150,13 +155,14 @@ class ComputeOptions:
         """With the executor that `workers` and `dask` name; it is closed afterwards.
 
         Raises:
-            BadParameter: Both are given.
-            InputError, ValueError, ImportError, ConnectionError: See `run.compute.open_compute`.
+            InputError: Both are given, or see `run.compute.open_compute`.
+            ValueError, ImportError, ConnectionError: Likewise.
         """
         from ..run.compute import open_compute, processes
 
         if self.dask is not None and self.workers not in (None, 1):
-            raise typer.BadParameter("--workers and --dask name two places to simulate: give one")
+            what = "names another place to simulate than --workers"
+            raise InputError(what, where="--dask", fix="give one of both")
         made = processes(self.workers) if self.dask is None else nullcontext(self.dask)
         with made as workers, open_compute(workers, self.timeout) as compute:
             yield compute

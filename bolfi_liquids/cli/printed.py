@@ -115,7 +115,9 @@ def print_next_stir(found: "NextStir") -> None:
         f"next stir: {found.label} ({found.cost:.0f} s). The sd of the viscosity's log is expected "
         f"to fall from {found.sd_before:.3f} to {found.sd_after:.3f}."
     )
-    if found.motion is not None:
+    if found.motion is None:
+        _print("There is no motion file, for a recording does not hold its plan: record as before.")
+    else:
         print_next(command("record", "--motion", found.motion, "--out", "DIR"))
 
 

@@ -268,9 +268,15 @@ def _coefficient(name: str, values: ParameterSummary) -> Facts:
     """Facts of an accepted effect: its size and meaning."""
     from ..models import EFFECTS
 
-    effect = EFFECTS.get(name)  # a user's own may not be registered in this process
-    known = {"text": effect.text, "neutral": with_unit(name, effect.neutral)} if effect else {}
-    return {"text": "", "neutral": "", **_parameter(name, values), **known}
+    text = EFFECTS[name].text if name in EFFECTS else ""
+    return {"text": text, "neutral": _neutral(name), **_parameter(name, values)}
+
+
+def _neutral(name: str) -> str:
+    """Coefficient without effect; "" of a user's own that this process has not registered."""
+    from ..models import EFFECTS
+
+    return with_unit(name, EFFECTS[name].neutral) if name in EFFECTS else ""
 
 
 def _place(window: DifferingWindow) -> Facts:
@@ -309,6 +315,7 @@ def _effects(source: "DataTree") -> list[Facts]:
     return [
         {
             "name": spoken(one["effect"]),
+            "neutral": _neutral(one["effect"]) or NONE,
             "typical": _number(one["typical"], ".3g", unit_of(one["effect"])),
             "smallest": _number(one["smallest"], ".2g", unit_of(one["effect"])),
             "limit": _number(one["limit"], ".2g", unit_of(one["effect"])),

@@ -21,6 +21,8 @@ OWN_EFFECTS = "BOLFI_LIQUIDS_EFFECTS"
 """Environment variable that names files of effects of one's own, separated as in PATH. Each defines
 `EFFECT`, and every process that simulates loads it."""
 
+NO_EFFECT = "it must be a Python file that defines EFFECT, a models.Effect"
+
 _registered: dict[str, Effect] = {}
 _digests: dict[str, str] = {}
 
@@ -88,20 +90,28 @@ def _discover() -> None:
 def _load(path: str) -> None:
     """Register the effect that a file defines."""
     try:
-        spec = spec_from_file_location(Path(path).stem, path)
-        if spec is None or spec.loader is None:
-            raise FileNotFoundError(f"{path} is no Python file")
-        spec.loader.exec_module(module := module_from_spec(spec))
-        effect = module.EFFECT
-    except Exception as err:  # of a file that a person wrote: whatever is wrong in it
-        raise ValueError(
-            f"{OWN_EFFECTS} names {path}: {type(err).__name__}: {err}; it must be a Python file "
-            "that defines EFFECT, a models.Effect"
-        ) from err
-    try:
-        _registered_from(effect, Path(path))
+        _registered_from(_defined_in(path), Path(path))
     except ValueError as err:
         raise ValueError(f"{OWN_EFFECTS} names {path}: {err}") from err
+
+
+def _defined_in(path: str) -> Effect:
+    """What a file calls EFFECT.
+
+    Raises:
+        ValueError: it defines none, or fails.
+    """
+    spec = spec_from_file_location(Path(path).stem, path)
+    if spec is None or spec.loader is None:
+        raise ValueError(NO_EFFECT)
+    module = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as err:  # of a file that a person wrote: whatever is wrong in it
+        raise ValueError(f"{type(err).__name__}: {err}") from err
+    if not isinstance(effect := getattr(module, "EFFECT", None), Effect):
+        raise ValueError(NO_EFFECT)
+    return effect
 
 
 _discover()

@@ -28,4 +28,5 @@ EFFECT = Effect(
     "model of the robot; heights are kept",
     make_prior=_prior,
     rig=_rig,
+    lowest=0.0,
 )

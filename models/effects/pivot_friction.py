@@ -28,4 +28,5 @@ EFFECT = Effect(
     "4 torque / (mass g length / 2) each cycle",
     make_prior=_prior,
     rig=_rig,
+    lowest=0.0,
 )

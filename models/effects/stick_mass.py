@@ -24,4 +24,5 @@ EFFECT = Effect(
     "air its swing does not show its mass",
     make_prior=_prior,
     rig=_rig,
+    lowest=0.01,
 )

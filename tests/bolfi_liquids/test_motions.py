@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware import RigError, bundled_rig
 from bolfi_liquids.hardware.motion import Trajectory, joined
-from bolfi_liquids.hardware.rig import MAX_CYCLES
+from bolfi_liquids.hardware.rig import MAX_CYCLES, MOTION_FIELDS
 from bolfi_liquids.inference.criticism import KnownNoise
 from scipy.spatial import cKDTree
 
@@ -119,8 +119,6 @@ def test_a_missing_position_changes_no_motion(stirring):
         ("speed = 0.16", "speed"),
         ("radius = 0.038", "radius"),
         ("points = 4", "points"),
-        ("sped = 0.1", "sped"),
-        ("clear_height = 0.5", "clear_height"),
     ],
 )
 def test_a_motion_that_the_rig_does_not_allow_is_refused_by_its_field(tmp_path, text, field):
@@ -129,6 +127,25 @@ def test_a_motion_that_the_rig_does_not_allow_is_refused_by_its_field(tmp_path, 
     with pytest.raises(RigError) as caught:
         rig_of(None, path)
     assert caught.value.where == f"{path}: stirring.{field}"
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("sped = 0.1", "sped"),
+        ("clear_height = 0.5", "clear_height"),
+        ("[stirring]\nspeed = 0.08", "stirring"),
+    ],
+)
+def test_what_is_no_field_of_a_motion_is_refused_with_those_that_are(tmp_path, text, name):
+    path = tmp_path / "motion.toml"
+    path.write_text(text)
+    with pytest.raises(RigError) as caught:
+        rig_of(None, path)
+    assert caught.value.where == f"{path}: {name}"
+    assert (
+        f"has {', '.join(MOTION_FIELDS)}, at the file's top without a heading" in caught.value.fix
+    )
 
 
 def test_a_circle_rests_nowhere_and_a_fault_of_the_rig_is_its_own(tmp_path):

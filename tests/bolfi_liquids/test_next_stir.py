@@ -45,7 +45,10 @@ def test_a_run_gets_the_motion_that_is_expected_to_tell_most(calibration, monkey
 
 
 def test_where_the_same_stir_is_best_no_motion_is_left(monkeypatch, tmp_path):
-    for motion, said in ((None, "same"), (tmp_path / FILE, f"record --motion {tmp_path / FILE}")):
+    for motion, said in (
+        (None, "There is no motion file"),
+        (tmp_path / FILE, f"record --motion {tmp_path / FILE}"),
+    ):
         stir = next_stir.NextStir("the same stir again", 7.0, 0.1, 0.05, motion)
         monkeypatch.setattr(next_stir, "design_stir", lambda *_, stir=stir, **__: stir)
         result = CliRunner().invoke(app, ["design", str(tmp_path)])

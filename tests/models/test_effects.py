@@ -159,9 +159,10 @@ def test_a_stir_that_diverged_stays_nan_behind_every_sensor(stir):
         ({"camera_delay": "late"}, "camera_delay must be a number or an array, got 'late'"),
         ({"camera_delay": None}, "camera_delay must be finite, got None"),
         (["fill_level"], "must map names to coefficients"),
-        ({"pivot_friction": -1e-4}, "pivot_friction must not be negative.*-0.0001"),
-        ({"stick_mass": [1.0, -1.0, 1.0]}, "stick_mass must be positive"),
+        ({"pivot_friction": -1e-4}, "pivot_friction must be 0 to inf, got -0.0001"),
+        ({"stick_mass": [1.0, -1.0, 1.0]}, "stick_mass must be 0.01 to inf"),
         ({"gripper_scale": 1e9}, "path must be finite and within 10 m"),
+        ({"gripper_scale": -1.0}, "gripper_scale must be 0 to inf"),
         ({"fill_level": 1.0}, r"fill must be 0 to 0\.075 m, got 1\.05.*effects fill_level"),
     ],
 )
@@ -192,6 +193,13 @@ def test_bad_coefficients_are_named(stir, effects, message):
 def test_nonsense_is_no_effect(changes, message):
     with pytest.raises(ValueError, match=message):
         outside(**changes)
+
+
+@pytest.mark.parametrize("name", models.EFFECTS)
+def test_limits_hold_the_prior(name):
+    effect = models.EFFECTS[name]
+    drawn = np.asarray(effect.prior.sample(random.key(0), (2000,)))
+    assert effect.lowest <= drawn.min() and drawn.max() <= effect.highest
 
 
 def test_the_registry_takes_only_new_effects(register):

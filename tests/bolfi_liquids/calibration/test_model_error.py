@@ -116,8 +116,10 @@ def test_a_calibration_says_for_which_error_it_allows(calibration):
     summary = calibration.summary
     known = np.degrees(stirring_error(summary.best["viscosity"]))
     assert summary.model_error_deg == pytest.approx(np.hypot(1.0, SHORT_PART) * known, rel=0.2)
+    usual = degrees(summary.simulator_error_deg)
     for changes, words in (
-        ({}, [degrees(summary.model_error_deg), "usual"]),
+        ({}, [degrees(summary.model_error_deg), f"usual one at this viscosity is {usual}"]),
+        ({"model_error_deg": 0.56}, ["0.56°", f"usual one at this viscosity is {usual}"]),
         ({"clean": ("a.nc", "b.nc")}, ["learned from a.nc, b.nc"]),
         ({"model_error_deg": 0.0}, ["do not allow", "--surrogate signal"]),
     ):

@@ -59,6 +59,7 @@ def test_the_example_acts_in_worker_processes(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        ("from bolfi_liquids.models import Effect\nEffect('cohesion', 0, 0, 0, 0, 0, 0)", "taken"),
         (None, "FileNotFoundError"),
         ("1 / 0", "ZeroDivisionError"),
         ("effect = 1", "defines EFFECT"),
@@ -73,6 +74,7 @@ def test_a_file_that_defines_no_effect_is_refused(tmp_path, text, message):
     assert refused.returncode == 2 and message in refused.stderr
     assert str(tmp_path / "mine.py") in refused.stderr
     assert len(refused.stderr.splitlines()) == 1
+    assert ("Python file that defines" in refused.stderr) == (text in ("effect = 1", "EFFECT = 1"))
 
 
 def test_a_changed_file_is_another_simulator(tmp_path, monkeypatch):

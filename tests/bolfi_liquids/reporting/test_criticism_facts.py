@@ -80,8 +80,10 @@ PARTS = [
     ("baseline", {"baseline_left_out": ("stir.nc",)}, ["2 clean", "stir.nc"], ["--baseline"]),
     ("where", {}, ["stroke 1, xz plane, 1.0 to 2.0 s (1-first.nc): 2.50°", "at 0 to 3 cm/s"], []),
     ("where", {"where": ()}, ["No single"], []),
-    ("detectable", {}, ["camera delay (14), gripper scale (4)"], ["stick mass"]),
+    ("detectable", {}, ["would show", "camera delay (14), gripper scale (4)"], ["stick mass"]),
     ("undetectable", {"untested": ("gripper_scale",)}, ["stick mass", "Untested: gripper"], []),
+    ("unwarned", {}, ["verdict or pour raised", "with camera delay", "count no longer"], []),
+    ("unwarned", AGREES, ["posterior, verdict or pour raised a warning"], ["count no longer"]),
     ("next", TIED, ["record the star (9 s)", "5.5", "40 % to 2 %", "next_stir.toml"], []),
     ("next", TIED | {"suggestions": (CIRCLES,)}, ["None", "four circles", "1.0"], ["record"]),
 ]
@@ -102,6 +104,7 @@ def test_tables_hold_each_number_in_its_unit(criticise):
     first = facts["effects"]["stirs"][0]
     expected = [
         "camera delay",
+        "0 s",
         "0.07 s",
         "0.01 s",
         "0.02 s",
@@ -113,6 +116,7 @@ def test_tables_hold_each_number_in_its_unit(criticise):
     expected.append("0.05 s")
     assert list(first.values()) == [*expected, "named"]
     degrees = [f"{np.degrees(value):.2f}°" for value in (0.03, 0.01, 0.008, 0.012)]
+    assert facts["effects"]["stirs"][1]["neutral"] == "1"  # distances beside it are of a scale
     (held,) = facts["held_out"]
     assert list(held.values()) == ["camera delay", "third.nc", *degrees, "0.4", "33.3", True]
     assert facts["holds"] == {"camera delay": True}
