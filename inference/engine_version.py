@@ -1,4 +1,4 @@
 """Version of the engine, stored with results."""
 
-ENGINE_VERSION = "9"
+ENGINE_VERSION = "10"
 """Raised by a change of what the engine concludes from equal simulations."""

@@ -85,9 +85,9 @@ class Experiment:
             self.noise.draw(np.random.default_rng(0), samples(self.observed), 1)
         except (ValueError, IndexError) as err:
             raise ValueError(
-                f"{self.label}: the noise does not fit observed of the shape {self.shape}, of which "
-                f"{np.isfinite(self.observed).sum()} are finite ({err}); give an sd as a "
-                "number, or one for each finite value"
+                f"{self.label}: the noise does not fit observed of the shape {self.shape} with "
+                f"{np.isfinite(self.observed).sum()} finite values ({err}); give one sd, "
+                "or one for each of them"
             ) from err
 
     @property

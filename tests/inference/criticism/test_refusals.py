@@ -37,6 +37,7 @@ def clean(residual=ONES, noise=NOISE, **how):
     return criticism.CleanData(residual, noise, **how)
 
 
+OTHER_SDS = criticism.KnownNoise(np.full(7, 0.01))
 GAPPY = np.where(np.arange(30) == 3, np.nan, OBSERVED)
 UNSEEN = experiment(observed=np.zeros(30), label="unseen")
 GOOD = {
@@ -56,6 +57,8 @@ GOOD = {
         ({"extensions": {"thickness": criticism.Extension(POSITIVE)}}, "thickness"),
         ({"earlier": ({"thickness": [0.5]}, np.zeros((1, 30)))}, "earlier"),
         ({"held_out": UNSEEN}, "held_out"),
+        ({"experiment": experiment(noise=OTHER_SDS)}, "noise"),
+        ({"held_out": [replace(UNSEEN, noise=OTHER_SDS)]}, "unseen"),
         ({"held_out": [experiment(observed=OBSERVED.copy(), label="copy")]}, "copy"),
         (
             {"experiment": experiment(observed=GAPPY), "held_out": [experiment(observed=GAPPY)]},

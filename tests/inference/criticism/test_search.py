@@ -194,6 +194,31 @@ def test_held_out_data_that_the_explanation_fails_withdraw_it(drifting, criticis
         assert one.check == other.check and one.gain == other.gain
 
 
+def test_held_out_data_that_cannot_be_simulated_are_refused_first(counted):
+    """By a run, and three more in case that one failed by chance."""
+    shorter = {"simulate": lambda theta, seeds: oscillate(theta, seeds)[:, :40], "label": "shorter"}
+    elsewhere = replace(held_out(), identity="shorter", **shorter)
+    before = counted.runs
+    with pytest.raises(RuntimeError, match="shorter"):
+        fitted = replace(experiment(drift=0.06), simulate=counted)
+        criticism.criticise(fitted, PRIOR, EXTENSIONS, held_out=[elsewhere], plan=PLAN)
+    assert counted.runs == before
+
+
+@pytest.mark.parametrize("offset", [0.02, 0.03])
+def test_an_experiment_is_suggested_wherever_explanations_are_left(criticised, offset):
+    acting = {name: EXTENSIONS[name] for name in ("offset", "drift", "delay")}
+    found = criticised(
+        experiment(seed=2, drift=0.06, offset=offset), acting, proposals=[proposal(2.0)]
+    )
+    assert bool(found.suggestions) == (len(found.tied) > 1 or found.verdict.kind == "unknown")
+
+
+def test_advice_asks_for_nothing_that_was_done(criticised, drifting):
+    assert "held-out" not in drifting.advice
+    assert "held-out" in criticised(experiment(drift=0.06)).advice
+
+
 def test_a_user_may_accept_another_effect_than_is_named(criticised):
     found = criticised(experiment(drift=0.06), accept=["offset"])
     assert found.verdict.effects == ("drift",)
