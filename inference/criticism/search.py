@@ -276,6 +276,8 @@ class Search:
         left = study.plan.most - (len(self.runs) - self.counted)
         if self.limited:
             boxes = dict(list(boxes.items())[: max(left // count, 0)])
+        if not boxes:
+            return {}
         asked = [study.points(box, names, count) for names, box in boxes.items()]
         made = dict(zip(boxes, study.run_each(phase, asked), strict=True))
         boxes = {names: box for names, box in boxes.items() if len(made[names])}
@@ -360,10 +362,11 @@ class Search:
         self.refit(pairs)
         accepted = [one for one in self.found.values() if len(one.names) > 1 and one.accepted]
         if accepted:
-            pair = max(accepted, key=lambda c: c.gain)
+            pair = max(accepted, key=lambda c: c.evidence)
             alone = [self.found[(name,)] for name in pair.names]
             due = FAR_BEHIND * pair.gain, pair.gain - SETTLED_GAIN
             short = [one for one in alone if not one.refitted or due[0] < one.gain < due[1]]
+            self.counted = len(self.runs)
             self.refit([_moved(one, pair) for one in short])
 
 

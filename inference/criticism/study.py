@@ -43,8 +43,8 @@ class Plan:
             to eight where few are refitted.
         refits: Explanations that are refitted, and pairs of effects after them.
         held_out: Of each model for each held-out data set.
-        most: Of looks and refits of single effects together, and as many of pairs of them; those
-            beyond are left out.
+        most: Of looks and refits of single effects together, as many of pairs of them, and as many
+            of the single effects of the best pair; those beyond are left out.
     """
 
     base: int = 8
