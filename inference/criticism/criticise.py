@@ -71,15 +71,14 @@ class Criticism(Displayed):
     simulations: int
 
     def _shown(self) -> list[tuple[str, str]]:
+        units = {name: "" if unit == "1" else f" {unit}" for name, unit in self.units.items()}
         sizes = [
-            (name, f"{one.mean:.3g} [{one.q05:.3g}, {one.q95:.3g}] {self.units[name]}".rstrip())
+            (name, f"{one.mean:.3g} [{one.q05:.3g}, {one.q95:.3g}]{units[name]}")
             for name, one in self.coefficients.items()
         ]
         agrees = self.verdict.kind is VerdictKind.AGREEMENT
         limits = {name: one.limit for name, one in self.sensitivities.items() if agrees}
-        hidden = ", ".join(
-            f"{name} {size:.3g} {self.units[name]}".rstrip() for name, size in limits.items()
-        )
+        hidden = ", ".join(f"{name} {size:.3g}{units[name]}" for name, size in limits.items())
         untested = [("not tested", f"{name} ({why})") for name, why in self.untested.items()]
         inert = ", ".join(self.base.inert)
         suggested = [("suggested experiment", str(one.label)) for one in self.suggestions[:1]]
