@@ -103,7 +103,7 @@ def design_stir(
             proposals = list(_proposals(study, stirring, motions, middle))
             found, not_made = suggest(study, proposals, _rivals(posterior, middle, apart, seed))
         if not found:
-            why = next(iter(not_made.values()))
+            why = next(iter(not_made.values()), "each failed at the medians of the posterior")
             raise RuntimeError(f"{run.path}: no proposed stir could be simulated; {why}")
         best = found[0]
         motion = {one.label: asdict(one) for one in motions}.get(best.label)

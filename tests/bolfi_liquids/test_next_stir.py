@@ -44,6 +44,13 @@ def test_a_run_gets_the_motion_that_is_expected_to_tell_most(calibration, monkey
         rig_of(None, found.motion)
 
 
+def test_that_no_stir_can_be_simulated_is_said(calibration, monkeypatch):
+    monkeypatch.setattr(next_stir, "family", lambda *_: [])
+    monkeypatch.setattr(next_stir, "_proposals", lambda *_: iter(()))
+    with pytest.raises(RuntimeError, match="no proposed stir could be simulated"):
+        bl.design_stir(calibration, progress=False)
+
+
 def test_where_the_same_stir_is_best_no_motion_is_left(monkeypatch, tmp_path):
     for motion, said in (
         (None, "There is no motion file"),
