@@ -118,7 +118,7 @@ def strokes(rig: Rig, cycles: int | None = None) -> list[PosePath]:
     The star is that of `patterns.star`, but for its strokes, which last whole periods of the
     motion loop. The first one holds the rest above the cup's axis and the way to the first vertex,
     the last ends with a rest, and the others with a pause. A star ends at its first vertex and is
-    repeated from there. The strokes of a circle are the cycles of `patterns.circle`.
+    repeated from there. Each stroke of a circle is a whole `patterns.circle`.
 
     Raises:
         ValueError: `cycles` is below 1 or above `MAX_CYCLES`.

@@ -58,8 +58,8 @@ class CleanData:
         if residual.ndim != 2 or np.isinf(residual).any() or not np.isfinite(residual).any():
             raise ValueError(
                 "residual must have the shape [T, channels] (one channel: [:, None]), be finite "
-                "somewhere and infinite "
-                f"nowhere (NaN is a missing sample), got {self.residual!r:.100}"
+                "somewhere and infinite nowhere (NaN is a missing sample), got "
+                f"{self.residual!r:.100}"
             )
         check_noise("noise", self.noise)
         check_flag("same", self.same)

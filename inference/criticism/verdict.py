@@ -67,7 +67,8 @@ class Candidate:
         occam: Log of the share of the coefficients' prior that explains the data as well.
         refitted: Whether runs near its best parameters were made for it; what was not is not
             accepted.
-        promise: Gain that the base model's score of the effect promises.
+        promise: Gain that the effect's score promises: the base model's score, or of a pair that of
+            the model with its other effect.
         gaps: On the held-out data, where it was compared with them.
         unpredicted: Why it could not be simulated for held-out data; "" where it could.
     """

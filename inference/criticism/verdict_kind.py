@@ -3,7 +3,7 @@
 from enum import StrEnum
 
 CERTAIN = 0.95  # probability, on held-out data
-MAX_STATED = 0.995  # probability above which a person is told "over 99 %": none is certain
+MAX_STATED = 0.995  # probability above which "over 99 %" is printed: none is certain
 NONE, OTHER = "none", "none of these"  # explanations without a known effect
 
 
@@ -25,7 +25,7 @@ def advice(kind: VerdictKind, *, confirmed: bool, suggested: bool) -> str:
         suggested: Whether further experiments are suggested.
     """
     if kind is VerdictKind.AGREEMENT:
-        return "Look whether the sizes that could hide (`sensitivities`) matter to you."
+        return "Look whether the sizes that could hide matter to you."
     if kind is VerdictKind.UNKNOWN:
         return "Look where model and data differ, and add an extension that acts there."
     if kind is VerdictKind.TIE:

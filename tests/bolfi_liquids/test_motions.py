@@ -113,6 +113,15 @@ def test_a_missing_position_changes_no_motion(stirring):
     assert all(np.isfinite(planned(gapped, one).setups[0].submerged) for one in motions)
 
 
+def refused(directory, text):
+    """A motion file of this text, and the bundled rig's refusal of it."""
+    path = directory / "motion.toml"
+    path.write_text(text)
+    with pytest.raises(RigError) as caught:
+        rig_of(None, path)
+    return path, caught.value
+
+
 @pytest.mark.parametrize(
     ("text", "field"),
     [
@@ -122,11 +131,8 @@ def test_a_missing_position_changes_no_motion(stirring):
     ],
 )
 def test_a_motion_that_the_rig_does_not_allow_is_refused_by_its_field(tmp_path, text, field):
-    path = tmp_path / "motion.toml"
-    path.write_text(text)
-    with pytest.raises(RigError) as caught:
-        rig_of(None, path)
-    assert caught.value.where == f"{path}: stirring.{field}"
+    path, refusal = refused(tmp_path, text)
+    assert refusal.where == f"{path}: stirring.{field}"
 
 
 @pytest.mark.parametrize(
@@ -138,14 +144,9 @@ def test_a_motion_that_the_rig_does_not_allow_is_refused_by_its_field(tmp_path, 
     ],
 )
 def test_what_is_no_field_of_a_motion_is_refused_with_those_that_are(tmp_path, text, name):
-    path = tmp_path / "motion.toml"
-    path.write_text(text)
-    with pytest.raises(RigError) as caught:
-        rig_of(None, path)
-    assert caught.value.where == f"{path}: {name}"
-    assert (
-        f"has {', '.join(MOTION_FIELDS)}, at the file's top without a heading" in caught.value.fix
-    )
+    path, refusal = refused(tmp_path, text)
+    assert refusal.where == f"{path}: {name}"
+    assert f"has {', '.join(MOTION_FIELDS)}, at the file's top without a heading" in refusal.fix
 
 
 def test_a_circle_rests_nowhere_and_a_fault_of_the_rig_is_its_own(tmp_path):

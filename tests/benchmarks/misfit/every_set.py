@@ -18,7 +18,7 @@ Examine = Callable[[DataSet], dict]
 def run(
     examine: Examine, folder: Path, path: Path, workers: int, first: int | None
 ) -> Iterator[dict]:
-    """Examine what is left; yields each data set's result as it is kept.
+    """Examine the data sets that have no result yet. Yield each result once it is kept.
 
     Args:
         examine: A function of a module, for other processes.
