@@ -5,6 +5,8 @@ from importlib.resources import files
 
 import numpy as np
 import numpyro.distributions as dist
+import optuna
+import pandas as pd
 import pytest
 from bolfi_liquids.inference.surrogates.discrepancy import is_outlier
 from bolfi_liquids.inference.surrogates.log_likelihood import compressed, expanded
@@ -206,6 +208,119 @@ def test_a_simulator_of_log_likelihoods_returns_one_or_two_numbers():
         inference.fit(lambda t, s: np.zeros((len(s), 3)), BOX, surrogate="log_likelihood")
     with pytest.raises(ValueError, match="observed must be .*fit_losses"):
         inference.fit(noisy(banana, 0.0), BOX)
+
+
+def study_of(objective, n=60, seed=0, **how):
+    optuna.logging.set_verbosity(optuna.logging.CRITICAL)
+    made = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed), **how)
+    made.optimize(objective, n_trials=n)
+    return made
+
+
+def decay_loss(trial):
+    """The loss of two parameters; two trials in ten fail or are pruned."""
+    theta = {
+        "height": np.array([trial.suggest_float("height", 0.5, 6)]),
+        "rate": np.array([trial.suggest_float("rate", 0.05, 3, log=True)]),
+    }
+    if trial.number % 10 == 3:
+        return np.nan
+    if trial.number % 10 == 7:
+        raise optuna.TrialPruned
+    return float(losses(theta)[0])
+
+
+@pytest.fixture(scope="module")
+def study():
+    return study_of(decay_loss)
+
+
+def decay_log_likelihood(theta):
+    return -0.5 * losses(theta) / SD**2
+
+
+def test_a_study_s_trials_give_the_posterior_within_its_search_ranges(study):
+    fit = inference.from_trials(study, noise=SD)
+    assert str(fit.prior) == (
+        "Prior({'height': Uniform(low=0.5, high=6), 'rate': LogUniform(low=0.05, high=3)})"
+    )
+    assert len(fit.history.theta) == 54 and fit.failures == {"not finite": 6}
+    assert_near(fit, decay_log_likelihood, 0.1, 1.1)
+    assert moments(fit, lambda t: decay_log_likelihood(t) / 4.0)[1].max() < 0.6  # a wrong noise
+    unknown = inference.from_trials(study, DECAY, n=30)
+    assert unknown.prior is DECAY
+    assert_near(unknown, lambda t: -15.0 * np.log(losses(t)), 0.3, 1.2)
+
+
+@pytest.mark.parametrize(("direction", "sign"), [("minimize", -1.0), ("maximize", 1.0)])
+def test_a_study_of_the_log_likelihood_itself(direction, sign):
+    def objective(trial):
+        theta = {"a": trial.suggest_float("a", -3, 3), "b": trial.suggest_float("b", -2, 6)}
+        return sign * round_hill(theta)
+
+    fit = inference.from_trials(study_of(objective, direction=direction), log_likelihood=True)
+    assert_near(fit, round_hill, 0.1, 1.1)
+
+
+def test_a_frame_and_its_file_give_what_the_study_gives(study, tmp_path):
+    done = [trial for trial in study.trials if trial.state.name == "COMPLETE"]
+    frame = pd.DataFrame([{**trial.params, "loss": trial.value} for trial in done]).assign(rank=0)
+    frame.to_csv(tmp_path / "trials.csv")
+    given = (frame, tmp_path / "trials.csv", str(tmp_path / "trials.csv"))
+    fits = [inference.from_trials(one, DECAY, noise=SD) for one in given]
+    expected = inference.fit_losses(frame[["height", "rate"]], frame["loss"], DECAY, noise=SD)
+    u = np.random.default_rng(0).random((20, 2))
+    for fit in fits:
+        at = DECAY.from_unit(u)
+        np.testing.assert_array_equal(fit.log_prob(at), expected.log_prob(at))
+
+
+def of_whole_numbers(trial):
+    return trial.suggest_float("a", -3, 3) ** 2 + trial.suggest_int("layers", 1, 3)
+
+
+def of_choices(trial):
+    return trial.suggest_float("a", -3, 3) ** 2 + len(
+        trial.suggest_categorical("kind", ["x", "yy"])
+    )
+
+
+def of_branches(trial):
+    a = trial.suggest_float("a", -3, 3)
+    return a**2 if trial.number % 2 else a**2 + trial.suggest_float("b", -2, 6) ** 2
+
+
+def of_changing_ranges(trial):
+    return trial.suggest_float("a", -3, 3 + trial.number) ** 2
+
+
+def of_two_objectives(trial):
+    return trial.suggest_float("a", -3, 3), 1.0
+
+
+@pytest.mark.parametrize(
+    ("objective", "how", "told"),
+    [
+        (of_whole_numbers, {}, r"'layers' .* got IntDistribution.* Uniform\(0.5, 20.5\)"),
+        (of_choices, {}, "'kind' .* got CategoricalDistribution.* give a prior"),
+        (of_branches, {}, r"all have the parameters .* data frame"),
+        (of_changing_ranges, {}, r"all choose 'a' from FloatDistribution.* give a prior"),
+        (of_two_objectives, {"directions": ["minimize"] * 2}, "one objective"),
+        (lambda trial: np.nan, {}, "hold complete ones.*optimise first"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
+def test_a_study_that_says_no_posterior_is_refused_with_the_cure(objective, how, told):
+    made = study_of(objective, n=12, **how)
+    with pytest.raises(ValueError, match=f"(?s)trials must .*{told}"):
+        inference.from_trials(made, noise=1.0)
+
+
+def test_whole_numbers_are_read_with_a_prior():
+    made = study_of(of_whole_numbers, n=12)
+    prior = inference.Prior({"a": dist.Uniform(-3, 3), "layers": dist.Uniform(0.5, 3.5)})
+    fit = inference.from_trials(made, prior, noise=1.0, warn=False)
+    assert set(np.unique(fit.history.theta[:, 1])) <= {1.0, 2.0, 3.0}
 
 
 def test_the_guide_s_example():

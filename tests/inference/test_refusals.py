@@ -79,6 +79,13 @@ def cases():
             inference.fit_losses,
             {"theta": THETA, "loss": np.arange(9.0), "prior": prior, "noise": 1.0, "warn": False},
         ),
+        "from_trials": (
+            inference.from_trials,
+            {
+                "trials": {**THETA, "loss": np.arange(9.0)},
+                **{"prior": prior, "noise": 1.0, "warn": False},
+            },
+        ),
         "Bolfi": (inference.Bolfi, {"prior": prior, "observed": OBSERVED}),
         "Bolfi.ask": (inference.Bolfi(prior, OBSERVED).ask, {}),
         "Bolfi.tell": (engine.tell, {"theta": THETA, "signals": signals}),
@@ -207,6 +214,12 @@ VALUES = {
         *({"noise": None}, {"n": 3}, {"noise": 0.0}, {"n": 0, "noise": None, "loss": np.ones(9)}),
         *({"loss": -np.ones(9)}, {"loss": np.zeros(9), "noise": None, "n": 30}),
         *({"loss": np.ones(8)}, {"loss": np.full(9, np.nan)}),
+    ],
+    "from_trials": [
+        *({"trials": THETA}, {"trials": {"loss": np.ones(9)}}, {"trials": 3}, {"prior": None}),
+        *({"log_likelihood": True}, {"log_likelihood": None}, {"noise": None}, {"n": 3}),
+        ("loss", {"trials": {**THETA, "loss": -np.ones(9)}}),
+        ("theta", {"trials": {**FAR, "loss": np.ones(9)}}),
     ],
     "Prior": [
         *({"distributions": given} for given in ({}, dist.Uniform(0.0, 1.0), [dist.Normal()])),

@@ -1,0 +1,122 @@
+"""A posterior from the trials that an optimiser leaves."""
+
+from os import PathLike
+from typing import Any
+
+import numpy as np
+import numpyro.distributions as dist
+
+from .arguments import check_flag, checked_array, is_table, require
+from .bolfi import MIN_LEARN, Bolfi
+from .loop import fit_losses
+from .prior import Prior
+from .result import Fit
+from .surrogates.warnings import complain
+from .types import Theta
+
+OTHERWISE = (
+    "give a prior, in which a whole number from 1 to 20 is Uniform(0.5, 20.5), and as trials a "
+    "data frame of those that differ in its parameters alone, with a column `loss`"
+)
+"""The cure where the search space of a study is no prior."""
+
+
+def from_trials(
+    trials: Any,
+    prior: Prior | None = None,
+    *,
+    noise: float | None = None,
+    n: int | None = None,
+    log_likelihood: bool = False,
+    warn: bool = True,
+) -> Fit:
+    """Infer parameters from an optimiser's trials: how certain is the best one?
+
+    Args:
+        trials: An Optuna study, or what has its `trials` and `directions`; or a table with a column
+            for each parameter of the prior and one named `loss`, what was minimised: a data frame,
+            a mapping, or the path of a CSV file. Other columns are not read. A study's failed
+            trials are failed runs. Its pruned and unfinished ones, whose loss is not known, are
+            left out. Where it maximises, losses are its values with their signs changed.
+        prior: The parameters and their priors. None is the study's search ranges: Uniform, or
+            LogUniform where it searches logarithms.
+        noise, n: Of losses that are sums of squares, see `fit_losses`.
+        log_likelihood: Whether losses are negative log likelihoods, in place of `noise` and `n`.
+        warn: As in `fit`.
+
+    Raises:
+        ValueError: bad argument or losses, see `fit_losses`; several objectives; parameters that
+            some complete trials lack; without a prior, a table, or a study that searched whole
+            numbers, choices, or ranges that changed.
+
+    Warns:
+        EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
+    """
+    check_flag("warn", warn)
+    check_flag("log_likelihood", log_likelihood)
+    is_study = hasattr(trials, "trials") and hasattr(trials, "directions")
+    theta, loss = _of_study(trials) if is_study else _of_table(trials, prior)
+    prior = _search_ranges(trials) if prior is None else prior
+    if log_likelihood:
+        alone = noise is None and n is None
+        require(alone, "log_likelihood", "come without noise and n", (noise, n))
+        engine = Bolfi(prior, surrogate="log_likelihood", initial=MIN_LEARN)
+        engine.tell(theta, -checked_array("loss", loss))
+        return engine.fit(warn=warn, stacklevel=3)
+    made = fit_losses(theta, loss, prior, noise=noise, n=n, warn=False)
+    if warn:
+        complain(made.warnings, stacklevel=3)
+    return made
+
+
+def _of_table(table: Any, prior: Prior | None) -> tuple[Theta, Any]:
+    if isinstance(table, str | PathLike):
+        import pandas as pd
+
+        table = pd.read_csv(table)
+    due = "be an Optuna study, a table, or the path of a CSV file"
+    require(is_table(table), "trials", due, table)
+    require(prior is not None, "prior", "be given with a table, which has no search ranges", prior)
+    columns = [*getattr(prior, "names", ()), "loss"]
+    held = list(table.keys())
+    due = f"have the columns {columns}"
+    require(set(columns) <= set(held), "trials", due, held, cure="rename what has another name")
+    return {name: table[name] for name in columns[:-1]}, table["loss"]
+
+
+def _of_study(study: Any) -> tuple[Theta, np.ndarray]:
+    one = len(study.directions) == 1
+    due = "have one objective"
+    require(one, "trials", due, study.directions, cure="give its sum as a table's `loss`")
+    sign = -1.0 if study.directions[0].name == "MAXIMIZE" else 1.0
+    done = _finished(study)
+    loss = [sign * trial.value if trial.state.name == "COMPLETE" else np.nan for trial in done]
+    return {name: [t.params[name] for t in done] for name in done[0].params}, np.array(loss)
+
+
+def _finished(study: Any) -> list[Any]:
+    """Trials that are complete, and those that failed with all parameters chosen."""
+    complete = [trial for trial in study.trials if trial.state.name == "COMPLETE"]
+    require(complete, "trials", "hold complete ones", len(study.trials), cure="optimise first")
+    names = complete[0].params.keys()
+    for trial in complete:
+        alike = trial.params.keys() == names
+        due = f"all have the parameters {tuple(names)}"
+        require(alike, "trials", due, tuple(trial.params), cure=OTHERWISE)
+    failed = [t for t in study.trials if t.state.name == "FAIL" and t.params.keys() == names]
+    return complete + failed
+
+
+def _search_ranges(study: Any) -> Prior:
+    """The prior that a study searched."""
+    done = _finished(study)
+    found = {}
+    for name, of in done[0].distributions.items():
+        real = type(of).__name__ == "FloatDistribution"
+        due = f"choose {name!r} from a range of real numbers"
+        require(real, "without a prior trials", due, of, cure=OTHERWISE)
+        others = [t.distributions[name] for t in done if t.distributions[name] != of]
+        due = f"all choose {name!r} from {of}"
+        require(not others, "without a prior trials", due, others[:1], cure="give a prior")
+        found[name] = (dist.LogUniform if of.log else dist.Uniform)(of.low, of.high)
+    return Prior(found)
