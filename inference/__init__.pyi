@@ -22,6 +22,7 @@ from .prior import Prior as Prior
 from .result import Fit as Fit
 from .sampling.convergence import SamplingWarning as SamplingWarning
 from .simulations.bank import SimulationBank as SimulationBank
+from .simulations.program import Program as Program
 from .surrogates.base import Acquisition as Acquisition
 from .surrogates.discrepancy import DiscrepancyFamily as DiscrepancyFamily
 from .surrogates.log_likelihood import LogLikelihoodFamily as LogLikelihoodFamily

@@ -91,7 +91,8 @@ def _of_study(study: Any) -> tuple[Theta, np.ndarray]:
     sign = -1.0 if study.directions[0].name == "MAXIMIZE" else 1.0
     done = _finished(study)
     loss = [sign * trial.value if trial.state.name == "COMPLETE" else np.nan for trial in done]
-    return {name: [t.params[name] for t in done] for name in done[0].params}, np.array(loss)
+    theta = {name: np.array([t.params[name] for t in done]) for name in done[0].params}
+    return theta, np.array(loss)
 
 
 def _finished(study: Any) -> list[Any]:

@@ -115,6 +115,7 @@ def cases():
             inference.emulate(prior, THETA, signals, np.ones(signals.shape[1])).predict,
             {"theta": THETA},
         ),
+        "Program": (inference.Program, {"command": "model {a} {in}"}),
         "SimulationBank": (inference.SimulationBank, {}),
         "SimulationBank.get": (bank.get, row),
         "SimulationBank.put": (bank.put, {**row, "simulation": Simulation(signals[0], None, 0.0)}),
@@ -255,6 +256,11 @@ VALUES = {
     "emulate": [
         *({"outputs": GOOD[:7]}, {"outputs": GOOD[:, 0]}, {"outputs": np.full((9, 30), np.nan)}),
         *({"scale": np.ones(3)}, {"scale": np.zeros(30)}, {"theta": FAR}),
+    ],
+    "Program": [
+        *({"command": given} for given in ("", "model 'a", "model {a", ["model"])),
+        *({"write": "a = {a"}, {"write": 3}, {"read": "out"}, {"keep": 3}),
+        ("command", {"write": "a = {a}", "command": "model {a}"}),
     ],
     "SimulationBank": [{"path": path} for path in (5, None, "")],
     "SimulationBank.simulations": [{"identity": "other"}],

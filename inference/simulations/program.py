@@ -1,0 +1,215 @@
+"""Programs with a command line and files, as simulators."""
+
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from pathlib import Path
+from string import Formatter
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from ..arguments import check_callable, check_kind, check_text, require
+from .job import OneByOne
+
+FILES = frozenset({"in", "out"})
+TAIL = 5  # lines of stderr that an error holds
+TAIL_LETTERS = 1000
+
+_ends: ContextVar[float | None] = ContextVar("ends", default=None)  # of time.monotonic
+
+Write = Callable[[Path, dict[str, float], int], object]
+Read = Callable[[Path], Any]
+
+
+class RunFailed(RuntimeError):
+    """A run of a program gave no signal."""
+
+
+class Program(OneByOne):
+    """A simulator that is a program: `fit(Program("./model {in} {out}"), prior, observed)`.
+
+    Each run has an empty directory of its own, in which it starts, and which is removed when it
+    has ended. A run fails if it ends with another exit code than 0, or if its output is missing
+    or cannot be read; the error holds the last lines of its stderr. With `fit(timeout=)` a run
+    that is overdue is killed, with all processes of its group. Runs share nothing, so that threads
+    suffice to make several at a time: `fit(..., executor=ThreadPoolExecutor(4))`.
+
+    Args:
+        command: Its words are split as a shell does, without a shell. In braces, with a format if
+            need be: parameters such as {a} or {a:.3f}, {seed}, {in} and {out}, the files of input
+            and output. Words that begin with ./ or ../ are paths from the current directory of
+            whoever makes the Program; other relative paths are in the run's.
+        write: The text of {in}, with parameters and {seed} in braces (a brace itself is doubled);
+            or a function (directory, theta: name -> float, seed) that writes any files. None
+            writes `name = value` lines, of all parameters and the seed, where the command has {in}.
+        read: A function (directory) -> signal. None is `numpy.loadtxt` of `out`, where the command
+            has {out}, and of `stdout`, in which the directory holds what the program prints.
+        keep: Folder that gets the directories of failed runs; None removes them, too.
+
+    Raises:
+        ValueError: bad argument, or braces that do not match.
+    """
+
+    def __init__(
+        self,
+        command: str,
+        *,
+        write: str | Write | None = None,
+        read: Read | None = None,
+        keep: str | os.PathLike[str] | None = None,
+    ):
+        check_text("command", command)
+        words, named = _parsed("command", command, shlex.split)
+        require(words, "command", "have words", command)
+        if isinstance(write, str):
+            named |= _parsed("write", write, lambda text: [text])[1]
+            due = "have the word {in}, the file of the text that write gives"
+            require("in" in named, "command", due, command)
+        else:
+            check_callable("write, if no text,", write)
+        check_callable("read", read)
+        check_kind("keep", keep, str | os.PathLike | None)
+        folder = None if keep is None else Path(keep).absolute()
+        super().__init__(_Run(tuple(map(_from_here, words)), named, write, read, folder), _limited)
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One run of a program; see `Program`.
+
+    Attributes:
+        words: Of the command.
+        named: What words and template have in braces.
+    """
+
+    words: tuple[str, ...]
+    named: frozenset[str]
+    write: str | Write | None
+    read: Read | None
+    keep: Path | None = field(compare=False)
+
+    def __call__(self, theta: dict[str, float], seed: int) -> Any:
+        """Raises RunFailed, or TimeoutError where it was overdue."""
+        with TemporaryDirectory(prefix="program-", ignore_cleanup_errors=True) as made:
+            directory = Path(made)
+            kept = None if self.keep is None else self.keep / directory.name
+            try:
+                return self._simulate(directory, theta, seed)
+            except BaseException as error:
+                told = _explained(error, directory, kept)
+                if kept is not None:
+                    shutil.copytree(directory, kept, symlinks=True)
+                if isinstance(error, Exception) and not isinstance(error, TimeoutError):
+                    raise RunFailed(told) from error
+                raise
+
+    def _simulate(self, directory: Path, theta: dict[str, float], seed: int) -> Any:
+        known = {**theta, "seed": seed, **{name: str(directory / name) for name in FILES}}
+        self._check(theta, known)
+        if isinstance(self.write, str):
+            (directory / "in").write_text(self.write.format_map(known), encoding="utf-8")
+        elif self.write is not None:
+            self.write(directory, dict(theta), seed)
+        elif "in" in self.named:
+            lines = [f"{name} = {value}\n" for name, value in (theta | {"seed": seed}).items()]
+            (directory / "in").write_text("".join(lines), encoding="utf-8")
+        _execute([word.format_map(known) for word in self.words], directory)
+        if self.read is not None:
+            return self.read(directory)
+        return _numbers(directory / ("out" if "out" in self.named else "stdout"))
+
+    def _check(self, theta: Mapping[str, float], known: Mapping[str, object]) -> None:
+        """Raise ValueError for a name in braces that is none, and for a parameter without use."""
+        require(not FILES & theta.keys(), "parameters", f"not be named {sorted(FILES)}", [*theta])
+        unknown = sorted(self.named - known.keys())
+        require(not unknown, "names in braces", f"be among {sorted(known)}", unknown)
+        told = callable(self.write) or (self.write is None and "in" in self.named)
+        unused = sorted(theta.keys() - self.named)
+        due = "all be in braces in the command or its input"
+        require(told or not unused, "parameters", due, unused)
+
+
+def _execute(words: Sequence[str], directory: Path) -> None:
+    """Run a command in a directory; it ends with its whole group of processes when time is up.
+
+    Raises:
+        OSError: there is no such program.
+        RunFailed: another exit code than 0.
+        TimeoutError: it took longer than `_limited` allows.
+    """
+    ends = _ends.get()
+    with open(directory / "stdout", "wb") as out, open(directory / "stderr", "wb") as err:
+        program = subprocess.Popen(
+            words,
+            cwd=directory,
+            stdin=subprocess.DEVNULL,
+            stdout=out,  # a file, for a pipe that a grandchild inherits never ends
+            stderr=err,
+            process_group=0,
+        )
+        try:
+            code = program.wait(None if ends is None else max(ends - time.monotonic(), 0.0))
+        except BaseException as error:  # overdue, or interrupted by a person
+            with suppress(ProcessLookupError):
+                os.killpg(program.pid, signal.SIGKILL)
+            program.wait()
+            if isinstance(error, subprocess.TimeoutExpired):
+                raise TimeoutError("overdue") from error
+            raise
+    if code:
+        how = f"exit code {code}" if code > 0 else f"signal {signal.Signals(-code).name}"
+        raise RunFailed(f"{words[0]} ended with {how}")
+
+
+@contextmanager
+def _limited(seconds: float) -> Iterator[None]:
+    """Within it programs of this thread are killed once so many seconds are over."""
+    token = _ends.set(time.monotonic() + seconds)
+    try:
+        yield
+    finally:
+        _ends.reset(token)
+
+
+def _numbers(path: Path) -> np.ndarray:
+    require(path.exists() and path.stat().st_size, f"`{path.name}`", "hold numbers", "nothing")
+    return np.loadtxt(path, ndmin=1)
+
+
+def _explained(error: BaseException, directory: Path, kept: Path | None) -> str:
+    """What happened, the end of stderr, and where the files of the run are."""
+    path = directory / "stderr"
+    said = path.read_bytes().decode(errors="replace") if path.exists() else ""
+    tail = "\n".join(said.strip().splitlines()[-TAIL:])[-TAIL_LETTERS:]
+    what = f"{error}" if isinstance(error, RunFailed) else f"{type(error).__name__}: {error}"
+    files = "" if kept is None else f"; its files are in {kept}"
+    return f"{what}{files}{tail and f'; stderr ends:\n{tail}'}"
+
+
+def _from_here(word: str) -> str:
+    """A word that begins with ./ or ../ as an absolute path."""
+    if not word.startswith(("./", "../")):
+        return word
+    here = str(Path.cwd()).replace("{", "{{").replace("}", "}}")
+    return os.path.normpath(os.path.join(here, word))
+
+
+def _parsed(
+    argument: str, text: str, split: Callable[[str], list[str]]
+) -> tuple[list[str], frozenset[str]]:
+    """Words of a text, and what they have in braces."""
+    try:
+        words = split(text)
+        fields = [name for word in words for _, name, _, _ in Formatter().parse(word)]
+    except ValueError as error:
+        raise ValueError(f"{argument} cannot be read ({error}), got {text!r}") from error
+    return words, frozenset(name for name in fields if name is not None)
