@@ -25,7 +25,7 @@ def describe(value: Any) -> str:
     It knows nothing of what a function does: code that changed under one name reads the same.
     """
     if isinstance(value, Prior):
-        return f"Prior({describe(value.distributions)})"
+        return f"Prior({describe(value.model or value.distributions)})"
     if isinstance(value, dist.Distribution):
         return describe_distribution(value)
     if isinstance(value, partial):

@@ -1,6 +1,7 @@
 """Distributions of numpyro with all that the engine needs, where numpyro itself lacks it too."""
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -38,21 +39,22 @@ class Truncated:
 
     Args:
         base: Of SciPy, frozen.
-        low, high: Bounds, which may be infinite.
+        low, high: Bounds, which may be infinite, and arrays.
     """
 
-    def __init__(self, base: Any, low: float, high: float):
-        self.base = base
-        self.tail, self.inverse = (
-            (base.sf, base.isf) if low > base.median() else (base.cdf, base.ppf)
-        )
+    def __init__(self, base: Any, low: Any, high: Any):
+        self.base, self.upper = base, low > base.median()
         self.start, self.mass = self.tail(low), self.tail(high) - self.tail(low)
+
+    def tail(self, value: Any) -> np.ndarray:
+        return np.where(self.upper, self.base.sf(value), self.base.cdf(value))
 
     def cdf(self, value: np.ndarray) -> np.ndarray:
         return (self.tail(value) - self.start) / self.mass
 
     def ppf(self, q: np.ndarray) -> np.ndarray:
-        return self.inverse(self.start + q * self.mass)
+        tail = self.start + q * self.mass
+        return np.where(self.upper, self.base.isf(tail), self.base.ppf(tail))
 
     def logpdf(self, value: np.ndarray) -> np.ndarray:
         """Within the bounds."""
@@ -66,7 +68,7 @@ TRUNCATED = (
 )
 
 
-def _frozen(distribution: Any, bounds: tuple[float, float]) -> Any:
+def _frozen(distribution: Any, bounds: tuple[Any, Any]) -> Any:
     """SciPy's equal of a distribution, or None."""
     truncated = isinstance(distribution, TRUNCATED)
     whole = distribution.base_dist if truncated else distribution
@@ -80,18 +82,21 @@ class Univariate:
     """cdf, icdf, log density and bounds of a scalar distribution, on NumPy arrays.
 
     Args:
-        distribution: Of numpyro, with batch and event shape ().
+        distribution: Of numpyro, with event shape (), and batch shape () or that of the arrays.
     """
 
     def __init__(self, distribution: dist.Distribution):
         self.distribution = distribution
         support: Any = distribution.support
-        self.bounds = (
-            float(getattr(support, "lower_bound", -np.inf)),
-            float(getattr(support, "upper_bound", np.inf)),
+        self.bounds: tuple[Any, Any] = (
+            np.asarray(getattr(support, "lower_bound", -np.inf), np.float64)[()],
+            np.asarray(getattr(support, "upper_bound", np.inf), np.float64)[()],
         )
         self._scipy = _frozen(distribution, self.bounds)
-        self._inner = self.icdf(np.asarray(0.5))
+
+    @cached_property
+    def _inner(self) -> np.ndarray:
+        return self.icdf(np.asarray(0.5))
 
     def cdf(self, value: np.ndarray) -> np.ndarray:
         made = self.distribution.cdf(value) if self._scipy is None else self._scipy.cdf(value)

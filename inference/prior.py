@@ -1,8 +1,9 @@
-"""Independent priors, and the map between parameters and their prior quantiles."""
+"""Priors, and the map between parameters and their prior quantiles."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any
+from itertools import count
+from typing import Any, cast
 
 import jax
 import numpy as np
@@ -11,9 +12,17 @@ from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
 from ._float64 import in_float64
-from .arguments import checked_array, checked_integer, checked_mapping, is_table, require
+from .arguments import (
+    check_called,
+    checked_array,
+    checked_integer,
+    checked_mapping,
+    is_table,
+    require,
+)
 from .distributions import Univariate, describe
 from .gp.process import BOTH_TAILS, LOWER_TAIL, NO_TAIL, UPPER_TAIL
+from .model_sites import visit
 from .types import Theta
 
 RESERVED = frozenset(
@@ -24,61 +33,135 @@ TAIL_QUANTILE = 1e-12  # at which an unbounded prior is cut, so that u = 0 and 1
 
 
 class Prior:
-    """Independent univariate priors by parameter name.
+    """Univariate priors by parameter name, each of which may depend on the parameters before it.
 
     The engine works in prior quantiles u = cdf(theta): there every prior is uniform on
-    [0, 1]^d, and whatever is learned depends on no parameter's unit or scale.
+    [0, 1]^d, and whatever is learned depends on no parameter's unit or scale. Of a parameter that
+    depends on others it is the quantile given these (Rosenblatt, Ann. Math. Stat. 23, 1952).
 
     Args:
-        distributions: Name -> scalar continuous numpyro distribution.
+        distributions: Name -> scalar continuous numpyro distribution; or, where these depend on
+            one another, a model of numpyro: a function without arguments, which calls
+            `numpyro.sample(name, distribution)` for each parameter.
         units: Name -> unit, such as "Pa s", of those that have one; kept with the results.
+
+    Attributes:
+        model: The model; None where the parameters are independent.
 
     Raises:
         ValueError: no parameter, a reserved name, an unusable distribution, or the unit of
-            an unknown parameter.
+            an unknown parameter; a model that has other than scalar parameters, or cannot be
+            called with arrays for these.
     """
 
     def __init__(
         self,
-        distributions: Mapping[str, dist.Distribution],
+        distributions: Mapping[str, dist.Distribution] | Callable[[], object],
         units: Mapping[str, str] | None = None,
     ):
-        some = isinstance(distributions, Mapping) and distributions
-        due = "map at least one parameter to its prior, such as {'a': dist.Uniform(0, 1)}"
-        require(some, "distributions", due, distributions)
-        self._univariate = {name: _checked(name, d) for name, d in distributions.items()}
-        self.distributions = dict(distributions)
+        of_model = callable(distributions) and not isinstance(distributions, dist.Distribution)
+        self.model: Callable[[], object] | None = cast(Any, distributions) if of_model else None
+        given: Any = _at_medians(self.model) if self.model is not None else distributions
+        due = (
+            "map at least one parameter to its prior, such as {'a': dist.Uniform(0, 1)}, or be a "
+            "model of numpyro"
+        )
+        require(isinstance(given, Mapping) and given, "distributions", due, distributions)
+        self._univariate = {name: _checked(name, d) for name, d in given.items()}
         self.units = checked_mapping("units", units, "texts")
         texts = all(isinstance(unit, str) for unit in self.units.values())
-        due = f"map some of the parameters {tuple(distributions)} to texts"
-        require(texts and set(self.units) <= set(distributions), "units", due, units)
-        self._bounds = {name: u.bounds for name, u in self._univariate.items()}
+        due = f"map some of the parameters {tuple(given)} to texts"
+        require(texts and set(self.units) <= set(given), "units", due, units)
+        if self.model is not None:
+            self._check_model()
 
     def __reduce__(self) -> tuple[Any, ...]:
         # a module of SciPy that unpickling imports before `scipy.stats` is imported twice, and
         # what was made by the first cannot be pickled again
-        return Prior, (self.distributions, self.units)
+        return Prior, (self.model or self.distributions, self.units)
+
+    @property
+    def distributions(self) -> dict[str, dist.Distribution]:
+        """Name -> distribution, of independent parameters.
+
+        Raises:
+            ValueError: they are a model's.
+        """
+        cure = "add what else is unknown to the model"
+        require(self.model is None, "prior", "have independent parameters", self, cure=cure)
+        return {name: one.distribution for name, one in self._univariate.items()}
 
     @property
     def names(self) -> tuple[str, ...]:
-        return tuple(self.distributions)
+        return tuple(self._univariate)
 
     def __len__(self) -> int:
-        return len(self.distributions)
+        return len(self._univariate)
 
     def __repr__(self) -> str:
-        inside = ", ".join(f"{n!r}: {describe(d)}" for n, d in self.distributions.items())
+        inside = ", ".join(f"{name!r}: {of['prior']}" for name, of in self.describe().items())
         return f"Prior({{{inside}}})"
 
     def describe(self) -> dict[str, dict[str, str]]:
-        """Name -> `prior`, such as "LogUniform(low=0.003, high=20)", and `units` where given."""
+        """Name -> `prior`, such as "LogUniform(low=0.003, high=20)", and `units` where given; of a
+        parameter that depends on others the prior at their medians."""
         return {
             name: {
-                "prior": describe(distribution),
+                "prior": describe(univariate.distribution) + self._conditions.get(name, ""),
                 **({"units": self.units[name]} if name in self.units else {}),
             }
-            for name, distribution in self.distributions.items()
+            for name, univariate in self._univariate.items()
         }
+
+    @cached_property
+    def _conditions(self) -> dict[str, str]:
+        """Parameter that depends on others -> at which values `describe` has its prior."""
+        named, medians = {}, {}
+        if self.model is None:
+            return named
+
+        def pair(place: int, univariate: Univariate) -> np.ndarray:
+            name = self.names[place]
+            if univariate.distribution.batch_shape:
+                named[name] = f" given {', '.join(medians.values())}"
+            medians[name] = f"{name}={float(self._univariate[name].icdf(np.asarray(0.5))):.4g}"
+            return univariate.icdf(np.array([0.4, 0.6]))
+
+        self._visit(pair)
+        return named
+
+    @in_float64
+    def _check_model(self) -> None:
+        """Raise ValueError unless a model's parameters have quantiles for arrays of them, too."""
+        u = np.random.default_rng(0).random((64, len(self)))
+        told = "its distributions for arrays are others than for numbers, or end before they begin"
+        try:
+            theta = self.from_unit(u)
+            alone = [self.to_array(self.from_unit(row)) for row in u[:4]]
+            alike = np.allclose(self.to_array(theta)[:4], alone)
+            alike = alike and np.allclose(self.to_unit(theta), u, atol=1e-6)
+        except (TypeError, ValueError) as error:
+            alike, told = False, error
+        if not alike:
+            raise ValueError(
+                "the model of a prior must take arrays [n] as its parameters, and have proper "
+                f"distributions wherever those before may lie ({told}); write jnp.where for `if`, "
+                "and see to the order of bounds"
+            )
+
+    def _visit(self, choose: Callable[[int, Univariate], np.ndarray]) -> None:
+        """Visit the parameters in order.
+
+        Args:
+            choose: Function (place, distribution given those before) -> values [...], which those
+                after are given.
+        """
+        if self.model is None:
+            for place, univariate in enumerate(self._univariate.values()):
+                choose(place, univariate)
+        else:
+            places = count()
+            visit(self.model, lambda _, given: choose(next(places), Univariate(given)))
 
     def to_array(self, theta: Theta) -> np.ndarray:
         """Stack parameters in the prior's order.
@@ -121,12 +204,15 @@ class Prior:
     @in_float64
     def to_unit(self, theta: Theta) -> np.ndarray:
         """Prior quantiles u [..., d] in [0, 1] of theta; outside the support 0 or 1."""
-        natural = self.to_array(theta)
-        columns = [
-            self._univariate[name].cdf(np.clip(natural[..., j], *self._bounds[name]))
-            for j, name in enumerate(self.names)
-        ]
-        return np.clip(np.stack(columns, -1), 0.0, 1.0)
+        natural, u = self.to_array(theta), []
+
+        def quantiles(place: int, univariate: Univariate) -> np.ndarray:
+            inside = np.clip(natural[..., place], *univariate.bounds)
+            u.append(univariate.cdf(inside))
+            return inside
+
+        self._visit(quantiles)
+        return np.clip(np.stack(u, -1), 0.0, 1.0)
 
     @in_float64
     def from_unit(self, u: np.ndarray) -> dict[str, np.ndarray]:
@@ -134,17 +220,23 @@ class Prior:
 
         0 and 1 give exactly the bounds of a prior that ends abruptly, as the uniform does,
         and a far but finite quantile of one that fades out, as the log-normal does at zero:
-        so the prior's density is positive and finite there.
+        so the prior's density is positive and finite there. Those of a model give such a quantile
+        in any case: at a bound of one parameter another may have no freedom left.
 
         Raises:
             ValueError: u is of another shape.
         """
-        u = checked_array("u", u)
+        u, theta = checked_array("u", u), []
         fits = u.shape[-1:] == (len(self),)
         require(fits, "u", self._columns_due("quantile"), u.shape)
-        return {
-            name: _quantile(self._univariate[name], u[..., j]) for j, name in enumerate(self.names)
-        }
+        quantile = _quantile if self.model is None else _inner_quantile
+
+        def values(place: int, univariate: Univariate) -> np.ndarray:
+            theta.append(quantile(univariate, u[..., place]))
+            return theta[-1]
+
+        self._visit(values)
+        return dict(zip(self.names, theta, strict=True))
 
     @cached_property
     @in_float64
@@ -154,23 +246,36 @@ class Prior:
         found = np.array([_tails(u) for u in self._univariate.values()])
         return found if found.any() else None
 
+    @in_float64
     def contains(self, theta: Theta) -> np.ndarray:
         """Whether theta lies in the support, bool [...]."""
         natural = self.to_array(theta)
-        low, high = np.array([self._bounds[name] for name in self.names]).T
-        return ((natural >= low) & (natural <= high)).all(-1)
+        inside = np.ones(natural.shape[:-1], bool)
+
+        def clipped(place: int, univariate: Univariate) -> np.ndarray:
+            nonlocal inside
+            (low, high), value = univariate.bounds, natural[..., place]
+            inside = inside & (low < high) & (value >= low) & (value <= high)
+            return np.clip(value, low, high)
+
+        self._visit(clipped)
+        return inside
 
     @in_float64
     def log_prob(self, theta: Theta) -> np.ndarray:
         """Log prior density of theta in natural units, [...]; -inf outside the support."""
         natural = self.to_array(theta)
-        inside = self.contains(theta)
         total = np.zeros(natural.shape[:-1])
-        for j, name in enumerate(self.names):
+
+        def clipped(place: int, univariate: Univariate) -> np.ndarray:
+            nonlocal total
             # clip before the density: outside its support a distribution may answer anything
-            clipped = np.clip(natural[..., j], *self._bounds[name])
-            total = total + self._univariate[name].log_prob(clipped)
-        return np.where(inside, total, -np.inf)
+            value = np.clip(natural[..., place], *univariate.bounds)
+            total = total + univariate.log_prob(value)
+            return value
+
+        self._visit(clipped)
+        return np.where(self.contains(theta), total, -np.inf)
 
     @in_float64
     def sample(self, key: jax.Array, n: int) -> dict[str, np.ndarray]:
@@ -245,9 +350,13 @@ def _ends_abruptly(univariate: Univariate, bound: float) -> bool:
     return bool(np.isfinite(bound) and np.isfinite(univariate.log_prob(np.asarray(bound))))
 
 
-def _quantile(univariate: Univariate, u: np.ndarray) -> np.ndarray:
+def _inner_quantile(univariate: Univariate, u: np.ndarray) -> np.ndarray:
     inner = univariate.icdf(np.clip(u, TAIL_QUANTILE, 1.0 - TAIL_QUANTILE))
-    value = np.clip(inner, *univariate.bounds)
+    return np.clip(inner, *univariate.bounds)
+
+
+def _quantile(univariate: Univariate, u: np.ndarray) -> np.ndarray:
+    value = _inner_quantile(univariate, u)
     for bound, there in zip(univariate.bounds, (u <= 0.0, u >= 1.0), strict=True):
         if _ends_abruptly(univariate, bound):
             value = np.where(there, bound, value)
@@ -260,6 +369,21 @@ def check_key(key: object) -> None:
     old = getattr(key, "dtype", None) == np.uint32 and np.shape(key) == (2,)  # pyright: ignore
     one = old or (new and key.shape == ())  # pyright: ignore
     require(one, "key", "be one key of JAX, such as jax.random.key(0)", key)
+
+
+@in_float64
+def _at_medians(model: Callable[[], object]) -> dict[str, dist.Distribution]:
+    """The distributions of a model's parameters, each given the medians of those before."""
+    check_called("distributions", model)
+    found: dict[str, dist.Distribution] = {}
+
+    def median(name: str, given: Any) -> np.ndarray:
+        require(name not in found, "the model of a prior", "name each parameter once", name)
+        found[name] = given
+        return _checked(name, given).icdf(np.asarray(0.5))[()]
+
+    visit(model, median)
+    return found
 
 
 @in_float64

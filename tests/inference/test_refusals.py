@@ -224,6 +224,7 @@ VALUES = {
     ],
     "Prior": [
         *({"distributions": given} for given in ({}, dist.Uniform(0.0, 1.0), [dist.Normal()])),
+        *({"distributions": given} for given in (lambda: None, lambda a: None)),
         *({"units": given} for given in ({"b": "m"}, {"a": 1.0}, ["m"], "m")),
     ],
     "Prior of one": [
