@@ -114,21 +114,17 @@ class Prior:
         }
 
     @cached_property
+    @in_float64
     def _conditions(self) -> dict[str, str]:
         """Parameter that depends on others -> at which values `describe` has its prior."""
-        named, medians = {}, {}
-        if self.model is None:
-            return named
-
-        def pair(place: int, univariate: Univariate) -> np.ndarray:
-            name = self.names[place]
-            if univariate.distribution.batch_shape:
-                named[name] = f" given {', '.join(medians.values())}"
-            medians[name] = f"{name}={float(self._univariate[name].icdf(np.asarray(0.5))):.4g}"
-            return univariate.icdf(np.array([0.4, 0.6]))
-
-        self._visit(pair)
-        return named
+        medians = self.from_unit(np.full((2, len(self)), 0.5))
+        said = [f"{name}={values[0]:.4g}" for name, values in medians.items()]
+        given = [univariate for _, univariate in self._given(self.to_array(medians))]
+        return {
+            name: f" given {', '.join(said[:place])}"
+            for place, name in enumerate(self.names)
+            if given[place].distribution.batch_shape
+        }
 
     @in_float64
     def _check_model(self) -> None:
@@ -162,6 +158,18 @@ class Prior:
         else:
             places = count()
             visit(self.model, lambda _, given: choose(next(places), Univariate(given)))
+
+    def _given(self, natural: np.ndarray) -> list[tuple[np.ndarray, Univariate]]:
+        """Of each parameter in theta [..., d] its values, moved into the support, and its
+        distribution given those before."""
+        found: list[tuple[np.ndarray, Univariate]] = []
+
+        def inside(place: int, univariate: Univariate) -> np.ndarray:
+            found.append((np.clip(natural[..., place], *univariate.bounds), univariate))
+            return found[-1][0]
+
+        self._visit(inside)
+        return found
 
     def to_array(self, theta: Theta) -> np.ndarray:
         """Stack parameters in the prior's order.
@@ -204,15 +212,8 @@ class Prior:
     @in_float64
     def to_unit(self, theta: Theta) -> np.ndarray:
         """Prior quantiles u [..., d] in [0, 1] of theta; outside the support 0 or 1."""
-        natural, u = self.to_array(theta), []
-
-        def quantiles(place: int, univariate: Univariate) -> np.ndarray:
-            inside = np.clip(natural[..., place], *univariate.bounds)
-            u.append(univariate.cdf(inside))
-            return inside
-
-        self._visit(quantiles)
-        return np.clip(np.stack(u, -1), 0.0, 1.0)
+        given = self._given(self.to_array(theta))
+        return np.clip(np.stack([one.cdf(values) for values, one in given], -1), 0.0, 1.0)
 
     @in_float64
     def from_unit(self, u: np.ndarray) -> dict[str, np.ndarray]:
@@ -250,32 +251,15 @@ class Prior:
     def contains(self, theta: Theta) -> np.ndarray:
         """Whether theta lies in the support, bool [...]."""
         natural = self.to_array(theta)
-        inside = np.ones(natural.shape[:-1], bool)
-
-        def clipped(place: int, univariate: Univariate) -> np.ndarray:
-            nonlocal inside
-            (low, high), value = univariate.bounds, natural[..., place]
-            inside = inside & (low < high) & (value >= low) & (value <= high)
-            return np.clip(value, low, high)
-
-        self._visit(clipped)
-        return inside
+        return _inside(natural, self._given(natural))
 
     @in_float64
     def log_prob(self, theta: Theta) -> np.ndarray:
         """Log prior density of theta in natural units, [...]; -inf outside the support."""
         natural = self.to_array(theta)
-        total = np.zeros(natural.shape[:-1])
-
-        def clipped(place: int, univariate: Univariate) -> np.ndarray:
-            nonlocal total
-            # clip before the density: outside its support a distribution may answer anything
-            value = np.clip(natural[..., place], *univariate.bounds)
-            total = total + univariate.log_prob(value)
-            return value
-
-        self._visit(clipped)
-        return np.where(self.contains(theta), total, -np.inf)
+        given = self._given(natural)  # outside its support a distribution may answer anything
+        total = sum(one.log_prob(values) for values, one in given)
+        return np.where(_inside(natural, given), total, -np.inf)
 
     @in_float64
     def sample(self, key: jax.Array, n: int) -> dict[str, np.ndarray]:
@@ -323,6 +307,15 @@ def _first_of(wrong: ArrayLike, theta: np.ndarray, names: tuple[str, ...]) -> st
     rows, at = np.atleast_2d(theta), np.flatnonzero(wrong)
     point = {name: float(rows[at[0], j]) for j, name in enumerate(names)}
     return f"{point} in row {at[0]}, the first of {at.size} such rows of {len(rows)}"
+
+
+def _inside(natural: np.ndarray, given: list[tuple[np.ndarray, Univariate]]) -> np.ndarray:
+    """Whether theta [..., d] lies in the support, bool [...]; `given` is of `Prior._given`."""
+    within = [
+        (values == natural[..., place]) & (one.bounds[0] < one.bounds[1])
+        for place, (values, one) in enumerate(given)
+    ]
+    return np.all(within, axis=0)
 
 
 def _tails(univariate: Univariate) -> int:
