@@ -14,6 +14,8 @@ PAGES = {
     "priors": "choosing a prior and the number of simulations, going on, seeds and noise",
     "criticism": "finding the effect that the simulator lacks",
     "simulator": "the inference engine with your own simulator",
+    "program": "a simulator that is a program with a command line and files",
+    "optimiser": "the posterior out of an optimiser's trials",
     "liquids": "simulated stirs and pours, effects, movies",
     "robot": "arm, cameras, safety, online calibration",
     "accuracy": "measured errors of fluid, posterior, pours and criticism",

@@ -130,6 +130,18 @@ def test_a_model_of_independent_parameters_is_their_mapping():
     assert of_model.describe() == of_mapping.describe() and repr(of_model) == repr(of_mapping)
 
 
+def triangle():
+    a = numpyro.sample("a", dist.Beta(1.0, 2.0))
+    numpyro.sample("b", dist.Uniform(0.0, 1.0 - a))
+
+
+def test_a_constraint_may_leave_the_density_uniform():
+    prior, theta = inference.Prior(triangle), np.random.default_rng(0).random((2, 200))
+    inside = theta.sum(0) < 1.0
+    density = np.exp(prior.log_prob({"a": theta[0], "b": theta[1]}))
+    np.testing.assert_allclose(density, np.where(inside, 2.0, 0.0), rtol=1e-6)
+
+
 def test_threads_do_not_mix_their_models(prior):
     u = np.random.default_rng(0).random((50, 5))
     other = inference.Prior(groups)
