@@ -15,8 +15,8 @@ from .surrogates.warnings import complain
 from .types import Theta
 
 OTHERWISE = (
-    "give a prior, in which a whole number from 1 to 20 is Uniform(0.5, 20.5), and as trials a "
-    "data frame of those that differ in its parameters alone, with a column `loss`"
+    "give a prior, in which a whole number from 1 to 20 is Uniform(0.5, 20.5); of several choices "
+    "take the trials of one, as a data frame with a column `loss`"
 )
 """The cure where the search space of a study is no prior."""
 
@@ -57,9 +57,12 @@ def from_trials(
     is_study = hasattr(trials, "trials") and hasattr(trials, "directions")
     theta, loss = _of_study(trials) if is_study else _of_table(trials, prior)
     prior = _search_ranges(trials) if prior is None else prior
+    if (noise is not None) + (n is not None) + log_likelihood != 1:
+        raise ValueError(
+            "give exactly one of noise=, n= and log_likelihood=True, which say what a loss is, got "
+            f"noise={noise!r:.100}, n={n!r:.100} and log_likelihood={log_likelihood}"
+        )
     if log_likelihood:
-        alone = noise is None and n is None
-        require(alone, "log_likelihood", "come without noise and n", (noise, n))
         engine = Bolfi(prior, surrogate="log_likelihood", initial=MIN_LEARN)
         engine.tell(theta, -checked_array("loss", loss))
         return engine.fit(warn=warn, stacklevel=3)

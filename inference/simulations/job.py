@@ -295,7 +295,8 @@ def misshapen(
         # `OneByOne` puts an axis for the one run before the signal's
         got = error.got if error.shape is None else error.shape[1:]
         due = "one signal" if shape is None else f"one signal of shape {shape}"
-        return unusable(f"with vectorised=False simulate must return {due}, got {got}{of_which}")
+        called = "with vectorised=False " if type(simulate) is OneByOne else ""
+        return unusable(f"{called}simulate must return {due}, got {got}{of_which}")
     due = f"({len(batch)}, ...)" if shape is None else (len(batch), *shape)
     single = error.shape is not None and error.shape == shape
     cure = "; if it makes one run at a time, pass vectorised=False" if single else ""

@@ -79,7 +79,8 @@ class Program(OneByOne):
         check_callable("read", read)
         check_kind("keep", keep, str | os.PathLike | None)
         folder = None if keep is None else Path(keep).absolute()
-        super().__init__(_Run(tuple(map(_from_here, words)), named, write, read, folder), _limited)
+        here = tuple(map(_from_here, words))
+        super().__init__(_Run(here, tuple(sorted(named)), write, read, folder), _limited)
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ class _Run:
     """
 
     words: tuple[str, ...]
-    named: frozenset[str]
+    named: tuple[str, ...]
     write: str | Write | None
     read: Read | None
     keep: Path | None = field(compare=False)
@@ -130,10 +131,10 @@ class _Run:
     def _check(self, theta: Mapping[str, float], known: Mapping[str, object]) -> None:
         """Raise ValueError for a name in braces that is none, and for a parameter without use."""
         require(not FILES & theta.keys(), "parameters", f"not be named {sorted(FILES)}", [*theta])
-        unknown = sorted(self.named - known.keys())
+        unknown = sorted(set(self.named) - known.keys())
         require(not unknown, "names in braces", f"be among {sorted(known)}", unknown)
         told = callable(self.write) or (self.write is None and "in" in self.named)
-        unused = sorted(theta.keys() - self.named)
+        unused = sorted(theta.keys() - set(self.named))
         due = "all be in braces in the command or its input"
         require(told or not unused, "parameters", due, unused)
 

@@ -127,6 +127,14 @@ def test_each_run_starts_in_an_empty_directory_that_goes(here):
     assert sorted(os.listdir(here)) == ["decay.py", "echo"]
 
 
+def test_an_output_of_another_shape_is_no_signal(here):
+    (run,) = run_missing(Program("echo {a} 1 2"), [Job({"a": 0.5}, 3)], Compute(), (2,))
+    assert run.error.kind is FailureKind.UNUSABLE
+    assert run.error.text == (
+        "simulate must return one signal of shape (2,), got (3,) for {'a': 0.5}, seed 3"
+    )
+
+
 @pytest.mark.parametrize(
     ("command", "told"),
     [
