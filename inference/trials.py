@@ -22,8 +22,8 @@ OTHERWISE = (
 
 
 def from_trials(
+    prior: Prior | None,
     trials: Any,
-    prior: Prior | None = None,
     *,
     noise: float | None = None,
     n: int | None = None,
@@ -33,13 +33,13 @@ def from_trials(
     """Infer parameters from an optimiser's trials: how certain is the best one?
 
     Args:
+        prior: The parameters and their priors. None is the study's search ranges: Uniform, or
+            LogUniform where it searches logarithms.
         trials: An Optuna study, or what has its `trials` and `directions`; or a table with a column
             for each parameter of the prior and one named `loss`, what was minimised: a data frame,
             a mapping, or the path of a CSV file. Other columns are not read. A study's failed
             trials are failed runs. Its pruned and unfinished ones, whose loss is not known, are
             left out. Where it maximises, losses are its values with their signs changed.
-        prior: The parameters and their priors. None is the study's search ranges: Uniform, or
-            LogUniform where it searches logarithms.
         noise, n: Of losses that are sums of squares, see `fit_losses`.
         log_likelihood: Whether losses are negative log likelihoods, in place of `noise` and `n`.
         warn: As in `fit`.

@@ -240,14 +240,14 @@ def decay_log_likelihood(theta):
 
 
 def test_a_study_s_trials_give_the_posterior_within_its_search_ranges(study):
-    fit = inference.from_trials(study, noise=SD)
+    fit = inference.from_trials(None, study, noise=SD)
     assert str(fit.prior) == (
         "Prior({'height': Uniform(low=0.5, high=6), 'rate': LogUniform(low=0.05, high=3)})"
     )
     assert len(fit.history.theta) == 54 and fit.failures == {"not finite": 6}
     assert_near(fit, decay_log_likelihood, 0.1, 1.1)
     assert moments(fit, lambda t: decay_log_likelihood(t) / 4.0)[1].max() < 0.6  # a wrong noise
-    unknown = inference.from_trials(study, DECAY, n=30)
+    unknown = inference.from_trials(DECAY, study, n=30)
     assert unknown.prior is DECAY
     assert_near(unknown, lambda t: -15.0 * np.log(losses(t)), 0.3, 1.2)
 
@@ -258,7 +258,7 @@ def test_a_study_of_the_log_likelihood_itself(direction, sign):
         theta = {"a": trial.suggest_float("a", -3, 3), "b": trial.suggest_float("b", -2, 6)}
         return sign * round_hill(theta)
 
-    fit = inference.from_trials(study_of(objective, direction=direction), log_likelihood=True)
+    fit = inference.from_trials(None, study_of(objective, direction=direction), log_likelihood=True)
     assert_near(fit, round_hill, 0.1, 1.1)
 
 
@@ -267,7 +267,7 @@ def test_a_frame_and_its_file_give_what_the_study_gives(study, tmp_path):
     frame = pd.DataFrame([{**trial.params, "loss": trial.value} for trial in done]).assign(rank=0)
     frame.to_csv(tmp_path / "trials.csv")
     given = (frame, tmp_path / "trials.csv", str(tmp_path / "trials.csv"))
-    fits = [inference.from_trials(one, DECAY, noise=SD) for one in given]
+    fits = [inference.from_trials(DECAY, one, noise=SD) for one in given]
     expected = inference.fit_losses(frame[["height", "rate"]], frame["loss"], DECAY, noise=SD)
     u = np.random.default_rng(0).random((20, 2))
     for fit in fits:
@@ -313,13 +313,13 @@ def of_two_objectives(trial):
 def test_a_study_that_says_no_posterior_is_refused_with_the_cure(objective, how, told):
     made = study_of(objective, n=12, **how)
     with pytest.raises(ValueError, match=f"(?s)trials must .*{told}"):
-        inference.from_trials(made, noise=1.0)
+        inference.from_trials(None, made, noise=1.0)
 
 
 def test_whole_numbers_are_read_with_a_prior():
     made = study_of(of_whole_numbers, n=12)
     prior = inference.Prior({"a": dist.Uniform(-3, 3), "layers": dist.Uniform(0.5, 3.5)})
-    fit = inference.from_trials(made, prior, noise=1.0, warn=False)
+    fit = inference.from_trials(prior, made, noise=1.0, warn=False)
     assert set(np.unique(fit.history.theta[:, 1])) <= {1.0, 2.0, 3.0}
 
 
