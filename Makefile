@@ -24,7 +24,7 @@ PEERS_SUPPORTED := import sys, ensurepip; sys.exit(not (3, 9) <= sys.version_inf
 
 .DELETE_ON_ERROR:
 
-.PHONY: setup demo browser test test-long physics against paper lint peers clean
+.PHONY: setup demo browser test test-long docs physics against paper lint peers clean
 
 setup: $(INSTALLED)
 
@@ -64,6 +64,11 @@ test: setup
 
 test-long: setup
 	$(BIN)/pytest -m minutes -o faulthandler_timeout=0
+
+# the site, docs/_build/html/index.html; `make docs NOTEBOOKS=1` executes the notebooks
+docs: setup
+	NOTEBOOKS=$(NOTEBOOKS) $(BIN)/sphinx-build -W --keep-going --quiet -c docs \
+		-d docs/_build/doctrees . docs/_build/html
 
 # cases of the fluid with their tables, or those whose names hold CASE; figures lie in RESULTS
 physics: setup
@@ -107,4 +112,4 @@ $(PEERS)/%/.installed: tests/benchmarks/peers/%.txt
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(PEERS) build dist *.egg-info .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(PEERS) build dist docs/_build *.egg-info .pytest_cache .ruff_cache

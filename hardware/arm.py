@@ -10,6 +10,8 @@ from .rig import Rig
 
 Six = tuple[float, float, float, float, float, float]
 Tool = Literal["stirring", "pouring"]
+"""What the gripper holds: the stick or the source."""
+
 WATCHDOG_PERIOD = 0.1  # s, after the last set-point, in which a controller stops its arm by itself
 LOOKAHEAD = 0.1  # s, by about which an arm lags its set-points
 

@@ -59,6 +59,24 @@ class Bolfi(Displayed):
 
     Raises:
         ValueError: an argument is not one of the above.
+
+    Example:
+        >>> import numpy as np
+        >>> import numpyro.distributions as dist
+        >>> from bolfi_liquids import inference
+        >>> prior = inference.Prior({"decay": dist.LogUniform(0.1, 10)})
+        >>> time = np.linspace(0, 5, 50)
+        >>> def measure(decay, seed):
+        ...     return np.exp(-decay * time) + np.random.default_rng(seed).normal(0, 0.05, 50)
+        >>> engine = inference.Bolfi(prior, measure(2.0, 123), noise=0)
+        >>> def run(theta):  # on a bench, or in a queue
+        ...     decays = enumerate(theta["decay"], start=engine.told)
+        ...     engine.tell(theta, [measure(decay, seed) for seed, decay in decays])
+        >>> for _ in range(3):
+        ...     run(engine.ask(4))
+        >>> run(engine.confirm(engine.fit(warn=False)))
+        >>> engine.fit().status
+        'fitted'
     """
 
     def __init__(  # noqa: PLR0913  one flat place for what defines a run

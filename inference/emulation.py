@@ -50,6 +50,19 @@ def emulate(prior: Prior, theta: Theta, outputs: ArrayLike, scale: ArrayLike) ->
     Raises:
         ValueError: shapes disagree, fewer than three finite rows, theta outside the support, or a
             scale that is not positive.
+
+    Example:
+        >>> import numpy as np
+        >>> import numpyro.distributions as dist
+        >>> from bolfi_liquids import inference
+        >>> prior = inference.Prior({"decay": dist.LogUniform(0.1, 10)})
+        >>> time = np.linspace(0, 5, 50)
+        >>> theta = {"decay": np.geomspace(0.1, 10, 12)}
+        >>> outputs = np.exp(-theta["decay"][:, None] * time)
+        >>> emulation = inference.emulate(prior, theta, outputs, scale=np.full(50, 0.05))
+        >>> error = emulation.predict({"decay": np.array([2.0])})[0] - np.exp(-2.0 * time)
+        >>> bool(abs(error).max() < 0.02)
+        True
     """
     rows = checked_prior(prior).to_dict(np.atleast_2d(prior.to_array(theta)))
     known, weights = checked_array("outputs", outputs), checked_array("scale", scale)

@@ -147,6 +147,20 @@ def fit(  # noqa: PLR0913  the one call that most users make
         EmulatorWarning: for each of the surrogate's complaints, unless warn=False. Where warnings
             are errors (`python -W error`), the first ends the call: a bank on disk has every
             simulation then, and warn=False returns the fit.
+
+    Example:
+        >>> import numpy as np
+        >>> import numpyro.distributions as dist
+        >>> from bolfi_liquids import inference
+        >>> prior = inference.Prior({"decay": dist.LogUniform(0.1, 10)})
+        >>> time = np.linspace(0, 5, 50)
+        >>> def simulate(theta, seed):
+        ...     noise = np.random.default_rng(seed).normal(0, 0.05, time.size)
+        ...     return np.exp(-theta["decay"] * time) + noise
+        >>> observed = simulate({"decay": 2.0}, 123)
+        >>> fit = inference.fit(simulate, prior, observed, budget=12, noise=0, vectorised=False)
+        >>> fit.status
+        'fitted'
     """
     batch = checked_integer("batch", batch, 1, MOST_SIMULATIONS)
     least = MIN_LEARN if earlier is None else 0
@@ -263,6 +277,17 @@ def fit_losses(
 
     Warns:
         EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
+
+    Example:
+        >>> import numpy as np
+        >>> import numpyro.distributions as dist
+        >>> from bolfi_liquids import inference
+        >>> prior = inference.Prior({"a": dist.Uniform(0, 2)})
+        >>> a = np.linspace(0, 2, 20)  # what an optimiser tried
+        >>> fit = inference.fit_losses({"a": a}, 1 + 20 * (a - 1.2) ** 2, prior, noise=0.2)
+        >>> draws = fit.sample("quadrature")["posterior"]["a"]
+        >>> print(f"{draws.mean():.2f} {draws.std():.2f}")  # exactly: 1.2 and 0.2 / sqrt(20)
+        1.20 0.04
     """
     if (noise is None) == (n is None):
         raise ValueError(

@@ -52,6 +52,16 @@ class Prior:
         ValueError: no parameter, a reserved name, an unusable distribution, or the unit of
             an unknown parameter; a model that has other than scalar parameters, or cannot be
             called with arrays for these.
+
+    Example:
+        >>> import numpy as np
+        >>> import numpyro.distributions as dist
+        >>> from bolfi_liquids import inference
+        >>> prior = inference.Prior({"viscosity": dist.LogUniform(0.01, 1)}, {"viscosity": "Pa s"})
+        >>> prior.from_unit(np.array([[0.5]]))["viscosity"].round(3)
+        array([0.1])
+        >>> prior.to_unit({"viscosity": np.array([0.1])}).round(3)
+        array([[0.5]])
     """
 
     def __init__(

@@ -102,6 +102,26 @@ class Fit(Displayed):
         before: The posterior of which `Bolfi.confirm` drew last; None where it never did.
         made_by: How it was made; None if not by `fit`, or without a simulator, or if the fit was
             copied or pickled, for simulators may not be.
+
+    Example:
+        >>> import numpy as np
+        >>> import numpyro.distributions as dist
+        >>> from bolfi_liquids import inference
+        >>> prior = inference.Prior({"decay": dist.LogUniform(0.1, 10)})
+        >>> time = np.linspace(0, 5, 50)
+        >>> def simulate(theta, seed):
+        ...     noise = np.random.default_rng(seed).normal(0, 0.05, time.size)
+        ...     return np.exp(-theta["decay"] * time) + noise
+        >>> observed = simulate({"decay": 2.0}, 123)
+        >>> fit = inference.fit(simulate, prior, observed, budget=12, noise=0, vectorised=False)
+        >>> low, high = fit.sample("quadrature")["posterior"]["decay"].quantile([0.05, 0.95])
+        >>> bool(low < 2.0 < high)
+        True
+        >>> density = fit.log_prob({"decay": np.array([1.0, 2.0, 4.0])})
+        >>> int(density.argmax())
+        1
+        >>> fit.simulations["decay"].shape  # 12, and 3 at draws of the posterior
+        (15,)
     """
 
     prior: Prior

@@ -148,7 +148,7 @@ class PourPlan(_Section, frozen=True):
 
 
 class Cups(_Section, frozen=True):
-    """Geometry of a pour; `models` of a cups.toml file."""
+    """Geometry of a pour, as a cups.toml file holds it."""
 
     source: Source
     receiver: Receiver

@@ -6,7 +6,9 @@ from dataclasses import asdict, dataclass
 from .apic.filling import POINTS
 from .number_checks import check_numbers
 
-MODEL_VERSION = "11"  # rises with every change that alters a simulation's bits
+MODEL_VERSION = "11"
+"""It rises with every change that alters a simulation's bits."""
+
 TESTED_RATIO = (0.7, 1.4)  # radii of a stick in cells, for which references were compared
 STEP_CELL = 0.005  # m, the cell that `longest_step` is for
 LARGEST_STEP = 4 / 3  # times `longest_step`, for larger cells

@@ -99,6 +99,21 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
         ValueError: bad argument; a store made with other settings; a pipeline that returns
             something of the wrong form, or a simulator that does so in all of the first
             replicates of a store. Replicates of which it does so are not kept.
+
+    Example:
+        >>> import numpy as np
+        >>> import numpyro.distributions as dist
+        >>> from bolfi_liquids import inference
+        >>> prior = inference.Prior({"mean": dist.Normal(0, 1)})
+        >>> def simulate(theta, seeds):  # four values of sd 1
+        ...     return np.stack([np.random.default_rng(seed).normal(mean, 1, 4)
+        ...                      for mean, seed in zip(theta["mean"], seeds)])
+        >>> def posterior(observed, seed):  # in closed form
+        ...     normal = np.random.default_rng(seed).normal
+        ...     return {"mean": normal(observed.sum() / 5, 0.2**0.5, 100)}
+        >>> runs = inference.replicates(posterior, simulate, prior, n=200, independent=True)
+        >>> inference.sbc(runs).ok
+        True
     """
     check_function("pipeline", pipeline)
     simulator = _own(pipeline, "simulate", simulate)

@@ -210,6 +210,23 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         RuntimeError: every simulation of a phase failed, or the executor lost its workers. An
             effect that could not be simulated at all is in `Criticism.untested` instead.
         ImportError, ConnectionError: Dask is not installed, or does not answer.
+
+    Example:
+        A parabola criticised as a straight line:
+
+        >>> import numpy as np
+        >>> import numpyro.distributions as dist
+        >>> from bolfi_liquids.inference import Prior, criticism
+        >>> time = np.linspace(0, 1, 40)
+        >>> def simulate(theta, seeds):
+        ...     bend = theta.get("bend", np.zeros(len(seeds)))
+        ...     return theta["slope"][:, None] * time + bend[:, None] * time**2
+        >>> observed = time + time**2 + np.random.default_rng(1).normal(0, 0.05, 40)
+        >>> data = criticism.Experiment(simulate, observed, criticism.KnownNoise(0.05))
+        >>> bend = criticism.Extension(dist.Normal(0, 1))
+        >>> found = criticism.criticise(data, Prior({"slope": dist.Uniform(-3, 3)}), {"bend": bend})
+        >>> found.accepted
+        ('bend',)
     """
     checked_prior(prior)
     check_extensions(prior, extensions)

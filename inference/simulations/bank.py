@@ -69,6 +69,23 @@ class SimulationBank(Displayed):
 
     Raises:
         ValueError: the file is not a simulation bank, or cannot be read and written.
+
+    Example:
+        >>> import numpy as np
+        >>> import numpyro.distributions as dist
+        >>> from bolfi_liquids import inference
+        >>> prior = inference.Prior({"decay": dist.LogUniform(0.1, 10)})
+        >>> time = np.linspace(0, 5, 50)
+        >>> def simulate(theta, seed):
+        ...     noise = np.random.default_rng(seed).normal(0, 0.05, time.size)
+        ...     return np.exp(-theta["decay"] * time) + noise
+        >>> observed = simulate({"decay": 2.0}, 123)
+        >>> with inference.SimulationBank() as bank:  # SimulationBank("runs.sqlite") keeps them
+        ...     fit = inference.fit(simulate, prior, observed, budget=12, noise=0, vectorised=False,
+        ...                         bank=bank, identity="decay")
+        ...     theta, signals, seeds = bank.simulations("decay")
+        >>> signals.shape
+        (15, 50)
     """
 
     def __init__(self, path: str | Path = ":memory:"):
