@@ -34,6 +34,7 @@ from ._float64 import in_float64
 from ._lazy import xr
 from .arguments import check_flag, checked_integer, require
 from .history import History
+from .interval_error import interval_error
 from .notebook_display import Displayed
 from .prior import Prior
 from .sampling.confirmation import Before
@@ -54,6 +55,7 @@ from .types import Simulator, Theta
 LEAST_EFFECTIVE = 32.0  # points of a population that stand for a posterior
 MUCH_DOUBT = 1.5  # see `Fit.doubt`: beyond it more is simulated, and a fit warns
 PREDICTED_DRAWS = 50  # draws of each chain for which the surrogate predicts
+TEN_MORE = 10  # runs, of which a printed fit says what they would bring
 SAMPLE_DIMS = ("chain", "draw")
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
 
@@ -158,6 +160,7 @@ class Fit(Displayed):
         surrogate = f"{self.settings['surrogate']!r}, of {self.training_mask.sum()} simulations"
         return [
             ("parameters", ", ".join(self._quantiles())),
+            ("interval ends", self._interval_ends()),
             ("simulations", f"{len(self.history.theta)}, failed: {failed or 'none'}"),
             ("discrepancy", self._discrepancies()),
             ("surrogate", ", ".join([surrogate, *self.learned.described()])),
@@ -173,6 +176,11 @@ class Fit(Displayed):
             low, middle, high = weighted_quantiles(values, weights, (0.05, 0.5, 0.95))
             said.append(f"{name} {middle:.4g} ({low:.4g} to {high:.4g})")
         return said
+
+    def _interval_ends(self) -> str:
+        """How well they are known, and what ten more runs would bring."""
+        now, then = self.interval_error(), self.interval_error(TEN_MORE)
+        return f"known to {now:.2g} sds of the posterior, to {then:.2g} by {TEN_MORE} more runs"
 
     def _discrepancies(self) -> str:
         """Discrepancies of the closest run, and of those at draws of the posterior."""
@@ -266,6 +274,20 @@ class Fit(Displayed):
         known = found._replace(x=found.x[there], log_weights=log_weights)
         (mean, sd), (sure_mean, sure_sd) = found.moments, known.moments
         return float(np.max(np.hypot(sd, mean - sure_mean) / np.maximum(sure_sd, LEAST)))
+
+    @in_float64
+    def interval_error(self, more: int = 0) -> float:
+        """Error of the parameters' 90 % intervals that the surrogate's doubt allows, in the
+        posterior's sds: the largest of all ends, see `interval_error.interval_error`.
+
+        Args:
+            more: Simulations at draws of the posterior, after which it is expected.
+        """
+        more, learned = checked_integer("more", more, 0), self.learned
+        if more:
+            drawn = self.population.resample(np.random.default_rng(0), more)
+            learned = learned.fantasize(ndtr(drawn))
+        return interval_error(self.population, self.learned.log_likelihood, learned)
 
     @property
     def surrogate(self) -> SurrogateView:

@@ -98,6 +98,10 @@ class Surrogate(Protocol):
         known = 2.0 * np.asarray(self.log_likelihood(u))
         return known if runs is None else np.repeat(known[:, None], len(runs), axis=1)
 
+    def realisations(self, rng: np.random.Generator, u: np.ndarray, n: int) -> np.ndarray:
+        """Log likelihoods [n, m] at different u [m, d] under n simulators that the runs allow."""
+        return np.repeat(np.asarray(self.log_likelihood(u))[None], n, axis=0)
+
     def log_success(self, u: np.ndarray) -> np.ndarray:
         """Log probability [n] that a run at u [n, d] succeeds."""
         return np.zeros(len(u))

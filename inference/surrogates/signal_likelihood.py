@@ -63,6 +63,11 @@ class SignalLikelihood(NamedTuple):
         densities = log_sum_exp(node_log_densities(self, u))
         return densities + log_success(self.success, u) - _wall(self, u)
 
+    def known(self, u: np.ndarray, latent: np.ndarray) -> np.ndarray:
+        """The log likelihood [n], were the scores at u [n, d] latent [k, n]."""
+        terms = _given_scores(self, u, latent.T * self.used, np.zeros(latent.T.shape))
+        return log_sum_exp(terms) + log_success(self.success, u) - _wall(self, u)
+
     def second_moment(self, u: np.ndarray, spread: np.ndarray | None) -> np.ndarray:
         """log E[L(u)^2], the expectation over means that vary with variance `spread` [n, ..., k].
 
@@ -115,7 +120,11 @@ def likelihood_of(
 
 def node_log_densities(state: SignalLikelihood, u: Any) -> Any:
     """The terms [n, g] of the likelihood's sum."""
-    mean, variance = scores(state, u)
+    return _given_scores(state, u, *scores(state, u))
+
+
+def _given_scores(state: SignalLikelihood, u: Any, mean: Any, variance: Any) -> Any:
+    """The terms [n, g] at scores of means and variances [n, k]."""
     of_noise, log_weight = state.covariance, state.log_weight
     if state.size is not None:
         factor = _noise_factor(state, state.size, u)
