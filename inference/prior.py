@@ -163,14 +163,20 @@ class Prior:
     @in_float64
     def log_prob(self, theta: Theta) -> np.ndarray:
         """Log prior density of theta in natural units, [...]; -inf outside the support."""
+        total = sum(self.log_probs(theta).values(), np.zeros(()))
+        return np.where(self.contains(theta), total, -np.inf)
+
+    @in_float64
+    def log_probs(self, theta: Theta) -> dict[str, np.ndarray]:
+        """Log prior density of each parameter in its own unit, name -> [...]; outside the support
+        that at its edge."""
         natural = self.to_array(theta)
-        inside = self.contains(theta)
-        total = np.zeros(natural.shape[:-1])
+        found = {}
         for j, name in enumerate(self.names):
             # clip before the density: outside its support a distribution may answer anything
             clipped = np.clip(natural[..., j], *self._bounds[name])
-            total = total + self._univariate[name].log_prob(clipped)
-        return np.where(inside, total, -np.inf)
+            found[name] = self._univariate[name].log_prob(clipped)
+        return found
 
     @in_float64
     def sample(self, key: jax.Array, n: int) -> dict[str, np.ndarray]:

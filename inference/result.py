@@ -8,15 +8,25 @@ and 5 and 95 % quantiles, `mcse_mean`, `mcse_q05`, `mcse_q95`. Of the group: `st
 or what is wrong), `rhat_max`, `ess_bulk_min`, `ess_tail_min`, `divergences`, `draws_made` (per
 chain, before thinning); for one or two parameters `quadrature_total_variation` (of 16 equally
 probable bins; independent draws as many as the effective ones stay below
-`quadrature_total_variation_limit`) and `log_evidence` of the surrogate's likelihood.
+`quadrature_total_variation_limit`); `log_evidence` and `log_evidence_error`, see `Fit.evidence`.
 
 sample_stats: `lp`, log density over Phi^-1(u) of the prior quantiles u, and what the sampler
-records. prior: as many draws. observed_data: `signal`. posterior_predictive: what the surrogate
-predicts at some draws, whose indices are its coordinate `draw`. constant_data: the surrogate's
-constants. emulator_checks: the surrogate's own checks for each simulation, NaN where it learned
-nothing from one, and the fit's complaints in the attribute `warnings`. simulations: as
-`Fit.simulations`. The root's attributes hold how the run was made, the seconds it took, and
-`fit_status`.
+records. prior: as many draws. observed_data: `signal`, and where samples of it are missing or
+averaged, or summarised, also the `values` that are compared. posterior_predictive,
+prior_predictive: what the surrogate predicts at each draw, of the same names, or the "discrepancy"
+or "log_likelihood" of a run. log_prior: log density of each parameter in its own units.
+
+log_likelihood: log density of each observed value given all others, which leave-one-out
+cross-validation needs (Buerkner, Gabry and Vehtari 2021): "signal" or "values", or "observed" where
+all that was observed is one datum. These densities do not add up to the likelihood where values
+hang together, by correlated noise, noise of unknown size or the emulator's error; "dependence" is
+what they lack, so that the group's sum is the log likelihood, as `az.psense_summary` wants it.
+`az.loo` and `az.compare` then need `var_name="signal"`.
+
+constant_data: the surrogate's constants. emulator_checks: the surrogate's own checks for each
+simulation, NaN where it learned nothing from one, and the fit's complaints in the attribute
+`warnings`. simulations: as `Fit.simulations`. The root's attributes hold how the run was made, the
+seconds it took, and `fit_status`.
 """
 
 import time
@@ -39,7 +49,14 @@ from .prior import Prior
 from .sampling.confirmation import Before
 from .sampling.convergence import SamplingWarning, diagnose
 from .sampling.draw import SAMPLERS, Sampled, draw_posterior
-from .sampling.importance import LEAST, Population, explore, weighted_quantiles
+from .sampling.importance import (
+    LEAST,
+    Evidence,
+    Population,
+    evidence_of,
+    explore,
+    weighted_quantiles,
+)
 from .sampling.target import Length, Target, log_likelihood
 from .surrogates.base import Surrogate, SurrogateView
 from .surrogates.warnings import (
@@ -53,7 +70,7 @@ from .types import Simulator, Theta
 
 LEAST_EFFECTIVE = 32.0  # points of a population that stand for a posterior
 MUCH_DOUBT = 1.5  # see `Fit.doubt`: beyond it more is simulated, and a fit warns
-PREDICTED_DRAWS = 50  # draws of each chain for which the surrogate predicts
+NO_DEPENDENCE = 1e-6  # nats
 SAMPLE_DIMS = ("chain", "draw")
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
 
@@ -302,6 +319,21 @@ class Fit(Displayed):
         values = log_likelihood(self._target, u.reshape(-1, u.shape[-1]))
         return self.prior.log_prob(theta) + values.reshape(u.shape[:-1])
 
+    @cached_property
+    @in_float64
+    def evidence(self) -> Evidence:
+        """Log of the probability density of what was observed, averaged over the prior.
+
+        Differences between models of the same data are logs of Bayes factors. Of the surrogate
+        "discrepancy" it is the probability of a discrepancy below the threshold; of
+        "log_likelihood", the simulator's own constant is in it. The error holds chance and what
+        the emulator does not know, but noise that is estimated from runs counts as known.
+        """
+        learned = self.learned
+        log, error = evidence_of(self.population, self._target, learned.log_second_moment)
+        error = float(np.sqrt(error**2 + learned.log_variance))
+        return Evidence(log + learned.log_constant, error)
+
     @in_float64
     def sample(  # noqa: PLR0913  each of them is a plain choice of the user's
         self,
@@ -428,15 +460,29 @@ def _tree(fit: Fit, made: Sampled, seed: int, attributes: Mapping[str, object]) 
     prior, chains, length = fit.prior, made.chains, made.chains.u.shape[1]
     posterior = prior.from_unit(chains.u)
     rng = np.random.default_rng([seed, *b"prior"])
-    before = prior.from_unit(rng.random((length, len(prior))))
-    tree = arviz_base.from_dict(
-        {
-            "posterior": posterior,
-            "sample_stats": dict(chains.stats),
-            "prior": {name: values[None] for name, values in before.items()},
-            "observed_data": {"signal": fit.observed},
-        }
+    u_before = rng.random((length, len(prior)))
+    before = {name: values[None] for name, values in prior.from_unit(u_before).items()}
+    generators = (np.random.default_rng([seed, *kind]) for kind in (b"predictive", b"before"))
+    shapes = (chains.u.shape[:2], (1, length))
+    drawn = chains.u.reshape(-1, len(prior)), u_before
+    predicted, expected = (
+        _shaped(fit.learned.predictive(generator, u), shape)
+        for generator, u, shape in zip(generators, drawn, shapes, strict=True)
     )
+    log_prior = prior.log_probs({name: values.ravel() for name, values in posterior.items()})
+    constants = {name: np.asarray(value) for name, value in fit.learned.constants().items()}
+    groups = {
+        "posterior": posterior,
+        "sample_stats": dict(chains.stats),
+        "prior": before,
+        "log_prior": _shaped(log_prior, shapes[0]),
+        "log_likelihood": _shaped(_log_likelihoods(fit, drawn[0]), shapes[0]),
+        "posterior_predictive": predicted,
+        "prior_predictive": expected,
+        "observed_data": {"signal": np.atleast_1d(fit.observed), **fit.learned.compared},
+        "constant_data": constants,
+    }
+    tree = arviz_base.from_dict({name: held for name, held in groups.items() if held})
     tree["simulations"] = xr.DataTree(fit.simulations)
     for group in ("posterior", "prior", "simulations"):
         for name, described in prior.describe().items():
@@ -451,21 +497,10 @@ def _tree(fit: Fit, made: Sampled, seed: int, attributes: Mapping[str, object]) 
         divergences=int(np.sum(chains.stats.get("diverging", 0))),
         status=made.status,
         draws_made=made.steps,
+        log_evidence=fit.evidence.log,
+        log_evidence_error=fit.evidence.error,
         **made.checks,
     )
-    constants = {name: np.asarray(value) for name, value in fit.learned.constants().items()}
-    if constants:
-        tree["constant_data"] = arviz_base.from_dict({"constant_data": constants})["constant_data"]
-    rows = np.linspace(0, length - 1, min(length, PREDICTED_DRAWS)).round().astype(int)
-    generator = np.random.default_rng([seed, *b"predictive"])
-    predicted = fit.learned.predictive(generator, chains.u[:, rows].reshape(-1, len(prior)))
-    if predicted:
-        groups = {
-            name: np.asarray(values).reshape(-1, len(rows), *np.shape(values)[1:])
-            for name, values in predicted.items()
-        }
-        drawn = arviz_base.from_dict({"posterior_predictive": groups}, coords={"draw": rows})
-        tree["posterior_predictive"] = drawn["posterior_predictive"]
     tree["emulator_checks"] = xr.DataTree(_emulator_checks(fit))
     for group in tree.children.values():
         sampled = [name for name in SAMPLE_DIMS if name in group.dims]
@@ -474,6 +509,20 @@ def _tree(fit: Fit, made: Sampled, seed: int, attributes: Mapping[str, object]) 
             group.attrs["sample_dims"] = sampled
     tree.attrs.update(attributes, version=version("bolfi-liquids"))
     return tree
+
+
+def _shaped(groups: Mapping[str, np.ndarray], shape: tuple[int, int]) -> dict[str, np.ndarray]:
+    """Rows [n, ...] as chains and draws [*shape, ...]."""
+    return {name: np.reshape(of, (*shape, *np.shape(of)[1:])) for name, of in groups.items()}
+
+
+def _log_likelihoods(fit: Fit, u: np.ndarray) -> dict[str, np.ndarray]:
+    """Log densities of the observed values at u [n, d], and what their sum lacks."""
+    terms = fit.learned.pointwise(u)
+    total = log_likelihood(fit._target, u) + fit.learned.log_constant
+    rest = total - sum(of.reshape(len(u), -1).sum(1) for of in terms.values())
+    together = np.abs(rest).max() > NO_DEPENDENCE
+    return {**terms, **({"dependence": rest} if together else {})}
 
 
 def _emulator_checks(fit: Fit) -> "xr.Dataset":

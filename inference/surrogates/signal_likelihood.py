@@ -79,7 +79,7 @@ class SignalLikelihood(NamedTuple):
         left = (self.estimate[loudest] - mean).reshape(len(u), *ones, k)
         covariance = self.covariance[loudest]
         if self.size is not None:
-            factor = _noise_factor(self, self.size, u)[np.arange(len(u)), loudest]
+            factor = noise_factor(self, self.size, u)[np.arange(len(u)), loudest]
             covariance = factor[:, None, None] * covariance
         covariance = covariance.reshape(len(u), *ones, k, k)
         total = total.reshape(left.shape)
@@ -118,7 +118,7 @@ def node_log_densities(state: SignalLikelihood, u: Any) -> Any:
     mean, variance = scores(state, u)
     of_noise, log_weight = state.covariance, state.log_weight
     if state.size is not None:
-        factor = _noise_factor(state, state.size, u)
+        factor = noise_factor(state, state.size, u)
         of_noise = factor[..., None, None] * of_noise
         log_weight = log_weight - 0.5 * (
             state.freedom * namespace(u).log(factor) + state.unexplained * (1.0 / factor - 1.0)
@@ -129,7 +129,7 @@ def node_log_densities(state: SignalLikelihood, u: Any) -> Any:
     return log_weight - 0.5 * (constant + log_det + square)
 
 
-def _noise_factor(state: SignalLikelihood, size: Size, u: Any) -> Any:
+def noise_factor(state: SignalLikelihood, size: Size, u: Any) -> Any:
     """The variance of all noise at u over that at size 1 of the run-to-run noise, [n, g].
 
     Exact where a node has no other noise, or next to no run-to-run noise; between the two, all of
