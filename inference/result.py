@@ -58,6 +58,7 @@ from .sampling.importance import (
     weighted_quantiles,
 )
 from .sampling.target import Length, Target, log_likelihood
+from .sensitivity import sobol_indices
 from .surrogates.base import Surrogate, SurrogateView
 from .surrogates.warnings import (
     COLLAPSED,
@@ -411,6 +412,32 @@ class Fit(Displayed):
             **{f"seconds_{part}": spent for part, spent in seconds.items()},
         }
         return _tree(self, made, seed, attributes)
+
+    @in_float64
+    def sobol(self, n: int = 2048, *, seed: int = 0) -> "xr.Dataset":
+        """Sobol indices of the emulated output with respect to the prior.
+
+        No simulator is run: they are as good as the emulator is, see `Fit.warnings`, over the whole
+        prior, and know nothing of the data. Those of the surrogates "discrepancy" and
+        "log_likelihood" are of the transformed discrepancy and of the log likelihood.
+
+        Args:
+            n: Points of each design, a power of two; n (d + 2) evaluations of the emulator.
+            seed: Fixes them.
+
+        Returns:
+            Over `parameter` and the output's axes: `first`, the share of the variance that a
+            parameter makes alone (Saltelli et al. 2010), and `total`, with all its interactions
+            (Jansen 1999); NaN of what does not vary. Over `parameter`: `first_of_all` and
+            `total_of_all`, the same of the whole output, weighted by variance (Lamboni et al. 2011,
+            Gamboa et al. 2014).
+
+        Raises:
+            ValueError: `n` is no power of two, or no value varies.
+        """
+        n = checked_integer("n", n, 2, MOST_DRAWS)
+        require(n.bit_count() == 1, "n", "be a power of two", n)
+        return sobol_indices(self.prior, self.learned, n, checked_integer("seed", seed, 0))
 
     def check(self, n: int = 200, **how: Any) -> Any:
         """Ranks and coverage of the pipeline that made this fit, on n data sets of known truth.
