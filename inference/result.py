@@ -35,7 +35,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from scipy.special import ndtr
@@ -59,7 +60,8 @@ from .sampling.importance import (
 )
 from .sampling.target import Length, Target, log_likelihood
 from .sensitivity import sobol_indices
-from .surrogates.base import Surrogate, SurrogateView
+from .stored_fit import check_same, read_fit, write_fit
+from .surrogates.base import Family, Surrogate, SurrogateView
 from .surrogates.warnings import (
     COLLAPSED,
     DOUBTED,
@@ -119,7 +121,10 @@ class Fit(Displayed):
         seconds: Time in the "simulator" and in the "engine" [s].
         before: The posterior of which `Bolfi.confirm` drew last; None where it never did.
         made_by: How it was made; None if not by `fit`, or without a simulator, or if the fit was
-            copied or pickled, for simulators may not be.
+            copied, pickled or loaded, for simulators may not be.
+        asked: Points that had been asked when it was made.
+        options: Those of the surrogate's family that are numbers, texts, arrays or None; None of a
+            family that is not the engine's own.
     """
 
     prior: Prior
@@ -131,6 +136,8 @@ class Fit(Displayed):
     seconds: Mapping[str, float]
     before: Before | None = None
     made_by: Recipe | None = None
+    asked: int = 0
+    options: Mapping[str, Any] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "made_by": None}
@@ -144,9 +151,10 @@ class Fit(Displayed):
         """
         if self.made_by is None:
             raise ValueError(
-                "the fit has no simulator: `fit` did not make it from one, or it was copied or "
-                "pickled; check inference.FitPipeline(simulate, prior) by inference.replicates, "
-                "or criticise a criticism.Experiment(simulate, observed, noise)"
+                "the fit has no simulator: `fit` did not make it from one, or it was copied, "
+                "pickled or loaded; check inference.FitPipeline(simulate, prior) by "
+                "inference.replicates, or criticise a "
+                "criticism.Experiment(simulate, observed, noise)"
             )
         return self.made_by
 
@@ -438,6 +446,48 @@ class Fit(Displayed):
         n = checked_integer("n", n, 2, MOST_DRAWS)
         require(n.bit_count() == 1, "n", "be a power of two", n)
         return sobol_indices(self.prior, self.learned, n, checked_integer("seed", seed, 0))
+
+    def save(self, path: str | Path) -> Path:
+        """Write the fit to one file, without pickle: prior, data, every simulation, and how it was
+        made. Functions of your own and the simulator are not in it.
+
+        Returns:
+            The file, a zip archive whose `fit.json` says how the fit was made.
+
+        Raises:
+            OSError: it cannot be written; nothing is left of it then.
+        """
+        return write_fit(path, self)
+
+    @classmethod
+    def load(
+        cls,
+        path: str | Path,
+        *,
+        prior: Prior | None = None,
+        surrogate: Family | None = None,
+        **options: Any,
+    ) -> Self:
+        """The fit that `save` wrote: learned again from its simulations, with the same bits.
+
+        It has no simulator: it cannot `check` or `criticise`.
+
+        Args:
+            path: Of the file.
+            prior: Where its distributions are more than their numbers, and for none other.
+            surrogate: The object, where it is of a class of your own.
+            options: Functions and objects that were options of the surrogate, such as
+                `discrepancy=...`, `summary=...` and `noise=...`.
+
+        Raises:
+            OSError: there is no such file.
+            ValueError: it is none of `save`, or one of another version of the engine; something
+                that must be given is missing, or is not what the fit was made with, by its
+                description, or by discrepancies and posterior densities at the simulations.
+        """
+        made = cls(**read_fit(path, prior, surrogate, options))
+        check_same(path, made)
+        return made
 
     def check(self, n: int = 200, **how: Any) -> Any:
         """Ranks and coverage of the pipeline that made this fit, on n data sets of known truth.
