@@ -43,7 +43,7 @@ from scipy.special import ndtr
 
 from ._float64 import in_float64
 from ._lazy import xr
-from .arguments import check_flag, checked_integer, require
+from .arguments import check_flag, check_kind, checked_integer, require
 from .history import History
 from .notebook_display import Displayed
 from .prior import Prior
@@ -446,6 +446,26 @@ class Fit(Displayed):
         n = checked_integer("n", n, 2, MOST_DRAWS)
         require(n.bit_count() == 1, "n", "be a power of two", n)
         return sobol_indices(self.prior, self.learned, n, checked_integer("seed", seed, 0))
+
+    @in_float64
+    def report(self, path: str | Path, tree: "xr.DataTree | None" = None) -> Path:
+        """Write one HTML page: parameters, whether the model fits, the emulator, what to do next.
+
+        Args:
+            path: Of the page, which needs nothing from outside it.
+            tree: What `sample` of this fit has returned; None samples now.
+
+        Returns:
+            The page.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        from .fit_report import write_report
+
+        if tree is not None:
+            check_kind("tree", tree, xr.DataTree)
+        return write_report(path, self, self.sample(warn=False) if tree is None else tree)
 
     def save(self, path: str | Path) -> Path:
         """Write the fit to one file, without pickle: prior, data, every simulation, and how it was

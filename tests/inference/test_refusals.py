@@ -88,6 +88,7 @@ def cases():
         "Bolfi.confirm": (engine.confirm, {"fit": engine.fit(warn=False)}),
         "Fit.log_prob": (fit.log_prob, {"theta": THETA}),
         "Fit.sample": (fit.sample, {"sampler": "quadrature", "draws": 8}),
+        "Fit.report": (fit.report, {"path": Path(tempfile.mkdtemp()) / "fit.html"}),
         "Fit.save": (fit.save, {"path": Path(tempfile.mkdtemp()) / "fit"}),
         "Fit.sobol": (fit.sobol, {"n": 64}),
         "Prior": (inference.Prior, {"distributions": {"a": dist.Uniform(0.0, 1.0)}}),
