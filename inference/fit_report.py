@@ -58,15 +58,17 @@ class Row(NamedTuple):
 def write_report(path: str | Path, fit: Any, tree: Any) -> Path:
     """See `Fit.report`; `fit` is one, `tree` what it sampled."""
     check_kind("path", path, str | Path)
-    z = tree["emulator_checks"].get("loo_z")
+    checks = tree["emulator_checks"]
+    z = checks["loo_z"].to_numpy() if "loo_z" in checks else np.zeros(0)
+    checked = np.isfinite(z).any()
     with rc_context(LOOK):
         page = _template().render(
             fit=fit,
             rows=list(_rows(fit, tree)),
             marginals=[_marginal(fit, tree, name) for name in fit.prior.names],
             outputs=list(_outputs(tree)),
-            loo=None if z is None else _errors(z.to_numpy()),
-            loo_size=None if z is None else float(np.sqrt(np.nanmean(np.square(z)))),
+            loo=_errors(z) if checked else None,
+            loo_size=float(np.sqrt(np.nanmean(np.square(z)))) if checked else None,
             posterior=tree["posterior"].attrs,
             advice=NEXT[fit.status],
             made=tree.attrs,
@@ -84,11 +86,11 @@ def _template() -> Any:
 def _rows(fit: Any, tree: Any) -> Iterator[Row]:
     for name, described in fit.prior.describe().items():
         draws, before = (tree[group][name].to_numpy() for group in ("posterior", "prior"))
-        quantiles = (f"{value:.4g}" for value in np.quantile(draws, SHARES))
+        low, middle, high = (f"{value:.4g}" for value in np.quantile(draws, SHARES))
         narrower = f"{before.std() / max(draws.std(), np.finfo(float).tiny):.3g}"
         rhat = f"{tree['posterior'][name].attrs['rhat']:.3f}"
         unit = described.get("units", "")
-        yield Row(name, unit, described["prior"], *quantiles, narrower, rhat)
+        yield Row(name, unit, described["prior"], low, middle, high, narrower, rhat)
 
 
 def _picture(draw: Callable[[Axes], None], alt: str, caption: str) -> Picture:
@@ -104,7 +106,8 @@ def _marginal(fit: Any, tree: Any, name: str) -> Picture:
     low, middle, high = np.quantile(draws, SHARES)
     ends = fit.prior.from_unit(np.tile([[1e-3], [1.0 - 1e-3]], len(fit.prior)))[name]
     reach = 1.5 * (high - low)
-    x = np.linspace(*np.clip([middle - reach, middle + reach], *ends), 200)
+    first, last = np.clip([middle - reach, middle + reach], *ends)
+    x = np.linspace(first, last, 200)
     median = fit.prior.from_unit(np.full(len(fit.prior), 0.5))
     at = {other: np.full(x.size, value) for other, value in median.items()} | {name: x}
     density = np.exp(fit.prior.log_probs(at)[name])
@@ -162,6 +165,6 @@ def _errors(z: np.ndarray) -> Picture:
             ax.plot(column, ".", color=COLOURS[j % len(COLOURS)])
         ax.set(xlabel="simulation", ylabel="error left out [sd]")
 
-    beyond = np.mean(np.abs(z[np.isfinite(z)]) > 2.0) if np.isfinite(z).any() else 0.0
+    beyond = np.mean(np.abs(z[np.isfinite(z)]) > 2.0)
     said = f"{beyond:.0%} of the errors exceed 2 standard deviations; 5 % are to be expected."
     return _picture(draw, "Studentised errors of the emulator at simulations left out", said)

@@ -28,6 +28,11 @@ def sobol_indices(prior: Prior, learned: Surrogate, n: int, seed: int) -> "xarra
     both = np.concatenate([first, second])
     variance = both.var(0)
     varies = variance > MIN_VARIANCE * np.square(both).max(0)
+    if not varies.any():
+        raise ValueError(
+            "no value of the emulated output varies with the parameters: look at Fit.warnings, and "
+            "simulate more, or with a wider prior"
+        )
     found = stats.sobol_indices(
         func={"f_A": first.T, "f_B": second.T, "f_AB": np.moveaxis(crossed, 2, 1)}, n=n
     )

@@ -10,12 +10,16 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import cholesky, get_lapack_funcs
 
 from ..gp.namespaces import log_sum_exp
 from .measurement_noise import Layout, Nodes
 from .signal_likelihood import SignalLikelihood, node_log_densities, noise_factor, scores
 
-MAX_RATIO = 700.0  # of logs
+TOGETHER = 256  # rows that are worked on together
+TRIED = 32  # rows that tell which nodes count
+NEGLIGIBLE = 1e-9
+MAX_LOG = 690.0  # of what exp may give: values more than 37 sds out are as bad as these
 FLOOR = 1e-12  # of the variance, of a value that nothing makes noisy
 
 
@@ -41,7 +45,9 @@ def covariances(
 
 
 def weighed(covariance: np.ndarray, vectors: np.ndarray, target: np.ndarray) -> Weighed:
-    precision = np.linalg.inv(covariance)
+    (invert,) = get_lapack_funcs(("potri",), (covariance,))
+    upper = np.triu(invert(cholesky(covariance))[0])  # half as long as a general inverse
+    precision = upper + np.triu(upper, 1).T
     right, seen = precision @ vectors, precision @ target
     return Weighed(np.diag(precision), seen, right, vectors.T @ right, vectors.T @ seen)
 
@@ -52,6 +58,8 @@ def log_conditionals(
     """log p(y_i | y_-i, u) of standardised values [n, m], integrated over the noise's nodes.
 
     1 / p(y_i | y_-i) is the mean of 1 / p_g(y_i | y_-i) over nodes g as probable as y makes them.
+    Nodes are left out that count for no value at some of u; an improbable one may count, where one
+    value alone speaks against it.
 
     Args:
         state: The likelihood, of k scores and g nodes.
@@ -59,18 +67,32 @@ def log_conditionals(
         noise: Covariance of the scores' run-to-run noise [k, k].
         u: Prior quantiles [n, d].
     """
+    some = u[:: -(-len(u) // TRIED)]
+    parts = list(_parts(state, nodes, noise, some))
+    total = sum(part for _, part, _ in parts)
+    kept = [g for g, part, share in parts if max((part / total).max(), share.max()) > NEGLIGIBLE]
+    state, nodes = state.only(kept), [nodes[g] for g in kept]
+    found = np.empty((len(u), len(nodes[0].target)))
+    for start in range(0, len(u), TOGETHER):
+        rows = slice(start, start + TOGETHER)
+        parts = _parts(state, nodes, noise, u[rows])
+        found[rows] = -np.log(sum(part for _, part, _ in parts))
+    return found
+
+
+def _parts(
+    state: SignalLikelihood, nodes: list[Weighed], noise: np.ndarray, u: np.ndarray
+) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+    """Number of a node, share / p_g(y_i | y_-i) [n, m], and its share of the likelihood [n]."""
     terms = node_log_densities(state, u)
     mean, variance = scores(state, u)
     factors = np.ones_like(terms) if state.size is None else noise_factor(state, state.size, u)
     shares = np.exp(terms - log_sum_exp(terms)[:, None])
-    first, total = None, 0.0
-    for g in np.argsort(-shares.sum(0)):
-        factor = factors[:, g, None]
+    for g, node in enumerate(nodes):
+        factor, share = factors[:, g, None], shares[:, g]
         latent = noise + (variance / factor)[:, :, None] * np.eye(len(noise))
-        own = _log_conditional(nodes[g], mean, latent, factor)
-        first = own if first is None else first  # the most probable node's, lest exp overflows
-        total = total + shares[:, g, None] * np.exp(np.minimum(first - own, MAX_RATIO))
-    return first - np.log(total)
+        own = _log_conditional(node, mean, latent, factor)
+        yield g, share[:, None] * np.exp(np.minimum(-own, MAX_LOG)), share
 
 
 def _log_conditional(

@@ -46,7 +46,6 @@ MISFIT_POINTS = 1024  # among which the smallest misfit is looked for
 NEEDED = 0.95  # posterior probability of a misfit from which it is said
 LEAST_SEEN = 0.01  # of the outputs' sd, from which a misfit is worth a word
 MAX_COMPONENTS = 8
-BATCH = 1024  # rows of pointwise densities that are made together, which bounds the memory
 SLOW = 0.9  # correlation of neighbouring samples from which noise looks like a signal
 
 
@@ -311,10 +310,7 @@ class SignalSurrogate(OfProcesses):
             every = covariances(*_noise(self.emulator, self.known), layout, self.nodes)
             nodes = [weighed(one, vectors, target) for one in every]
             noise = self.emulator.noise[: basis.used, : basis.used]
-            for start in range(0, len(u), BATCH):
-                rows = slice(start, start + BATCH)
-                terms[rows] = log_conditionals(self.log_likelihood, nodes, noise, u[rows])
-            terms += self._log_slopes
+            terms = log_conditionals(self.log_likelihood, nodes, noise, u) + self._log_slopes
         complete = self.output.complete
         return {"signal": self.output.restore(terms)} if complete else {"values": terms}
 

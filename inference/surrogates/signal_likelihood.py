@@ -53,6 +53,12 @@ class SignalLikelihood(NamedTuple):
             covariance=covariance,
         )
 
+    def only(self, kept: list[int]) -> "SignalLikelihood":
+        """The likelihood of some nodes."""
+        names = ["estimate", "covariance", "log_weight"]
+        names += [] if self.size is None else ["share", "unexplained"]
+        return self._replace(**{name: getattr(self, name)[kept] for name in names})
+
     def __call__(self, u: Any) -> Any:
         """log P(success) sum_g w_g N(estimate_g; mu(u), covariance_g + V(u)) [n], V the emulator's
         variance.

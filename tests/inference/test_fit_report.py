@@ -85,7 +85,9 @@ def test_the_same_fit_gives_the_same_page(page, fit, tmp_path):
     assert again.read_bytes() == path.read_bytes()
 
 
-@pytest.mark.parametrize("surrogate", ["discrepancy", "log_likelihood", "summary", "one number"])
+@pytest.mark.parametrize(
+    "surrogate", ["discrepancy", "log_likelihood", "summary", "one number", "constant"]
+)
 def test_every_surrogate_has_a_page(simulate, observed, tmp_path, surrogate):
     prior = inference.Prior({"slope": dist.Uniform(-1.0, 1.0), "offset": dist.Uniform(0.0, 1.0)})
     options = {
@@ -93,10 +95,12 @@ def test_every_surrogate_has_a_page(simulate, observed, tmp_path, surrogate):
         "log_likelihood": {"surrogate": "log_likelihood"},
         "summary": {"observed": observed, "summary": lambda signal: signal[[0, 15, 29]]},
         "one number": {"observed": observed[15]},
+        "constant": {"observed": observed},
     }[surrogate]
     simulators = {
         "log_likelihood": lambda theta, _: -9.0 * (theta["slope"] ** 2 + theta["offset"] ** 2),
         "one number": lambda theta, seeds: simulate(theta, seeds)[:, 15],
+        "constant": lambda theta, _: np.ones((len(theta["slope"]), observed.size)),
     }
     simulator = simulators.get(surrogate, simulate)
     fit = inference.fit(simulator, prior, confirm=0, **HOW, **options)

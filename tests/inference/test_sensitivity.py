@@ -70,3 +70,9 @@ def test_what_does_not_vary_has_no_index_and_a_discrepancy_has_one():
     scalar = fitted(half, prior, 12, surrogate="discrepancy").sobol(256)
     assert scalar["first"].dims[0] == "parameter"
     assert scalar["total"].squeeze()[0] > 0.9
+
+
+def test_where_nothing_varies_there_are_no_indices():
+    prior = inference.Prior({"a": dist.Uniform(0.0, 1.0)})
+    with pytest.raises(ValueError, match="varies"):
+        fitted(lambda theta, _: np.ones((len(theta["a"]), 3)), prior, 8).sobol()
