@@ -127,6 +127,33 @@ class Surrogate(Protocol):
         """One new observation for each row of u [n, d]: name -> [n, ...]."""
         return {}
 
+    def placed(self, values: np.ndarray) -> dict[str, np.ndarray]:
+        """What holds for each number of `predict`, [n, ...], at the place of what was observed:
+        name -> [n, ...]."""
+        return {"predicted": values}
+
+    @property
+    def compared(self) -> dict[str, np.ndarray]:
+        """What was made of the observed output, to be compared, where it is not the output itself:
+        name, as of `pointwise` -> [...]."""
+        return {}
+
+    @property
+    def log_constant(self) -> float:
+        """What `log_likelihood` lacks to be the log density of what was observed."""
+        return 0.0
+
+    @property
+    def log_variance(self) -> float:
+        """Variance of the log likelihood, by what the surrogate counts as noise and is its own
+        error, beyond that of `log_second_moment`."""
+        return 0.0
+
+    def pointwise(self, u: np.ndarray) -> dict[str, np.ndarray]:
+        """Log density of each observed value, given all others, at u [n, d]: name -> [n, ...]. Here
+        what was observed is one datum."""
+        return {"observed": np.asarray(self.log_likelihood(u)) + self.log_constant}
+
 
 class Family(Protocol):
     """How runs are compared with what was observed, and what is learned of them.
