@@ -38,7 +38,7 @@ class Until:
         checked_integer("most", self.most, MIN_LEARN, MOST_SIMULATIONS)
         check_callable("error", self.error)
 
-    def reached(self, made: Fit) -> bool:
+    def _reached(self, made: Fit) -> bool:
         """Whether a fit is known well enough, and nothing about it is complained of: an emulator
         that predicts nothing is sure of that."""
         error = made.interval_error() if self.error is None else float(self.error(made))
@@ -67,6 +67,6 @@ def enough(engine: Bolfi, until: Until | None) -> Callable[[], bool]:
         if until is None or early:
             return False
         looked = engine.told
-        return until.reached(engine.fit(warn=False))
+        return until._reached(engine.fit(warn=False))
 
     return stop

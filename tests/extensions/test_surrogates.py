@@ -196,6 +196,11 @@ def check_log_constant(of):
     assert finite(of.log_constant) and of.log_variance >= 0.0
 
 
+def check_realisations(of):
+    drawn = of.realisations(np.random.default_rng(0), POINTS, 5)
+    assert drawn.shape == (5, len(POINTS)) and not np.isnan(drawn).any()
+
+
 check_log_variance = check_log_constant
 check_described = check_unreached = check_warnings = check_sentences
 

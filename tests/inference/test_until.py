@@ -92,12 +92,6 @@ def test_the_error_may_be_a_decision_s():
     assert 30 <= len(fit.history.theta) < 40
 
 
-@pytest.mark.parametrize("how", [{"tolerance": 0.0}, {"tolerance": np.inf}, {"most": 2}])
-def test_limits_that_end_nothing_are_refused(how):
-    with pytest.raises(ValueError, match=f"{next(iter(how))} must"):
-        inference.Until(**how)
-
-
 @pytest.mark.parametrize("budget", ["all", 0, None])
 def test_a_budget_that_is_none_is_refused(budget):
     with pytest.raises(ValueError, match="budget must"):
