@@ -116,7 +116,7 @@ def paired(rows: list[dict], peer: str, cells: Sequence[tuple[str, int]]) -> dic
         )
         gains = np.array([theirs[seed] - ours[seed] for seed in ours.keys() & theirs.keys()])
         if len(gains):
-            p = wilcoxon(gains).pvalue if gains.any() else 1.0
+            p = wilcoxon(gains)[1] if gains.any() else 1.0
             found[cell] = Paired(float(np.median(gains)), float(p))
     corrected = holm([one.p for one in found.values()])
     return {c: one._replace(p=p) for (c, one), p in zip(found.items(), corrected, strict=True)}
