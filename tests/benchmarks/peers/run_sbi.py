@@ -31,7 +31,7 @@ def main(job: Job, imported: float) -> None:
     """Each budget from nothing; what is learned from is the signal's view, with its noise."""
     torch.set_num_threads(1)
     if job.engine == "npe_pfn" and not WEIGHTS.exists():
-        sys.exit(f"npe_pfn needs TabPFN's weights, which are not in {WEIGHTS}")
+        sys.exit(f"npe_pfn needs TabPFN's weights: there is no file {WEIGHTS}")
     task, observed, reference = load(job)
     for n in job.budgets:
         row = {"n": n, "import_s": imported, "version": sbi.__version__, "simulations": n}
