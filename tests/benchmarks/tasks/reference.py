@@ -14,8 +14,8 @@ COARSE = {1: 200, 2: 64, 3: 24}  # while the posterior is being looked for
 ROUNDS = 30
 SCATTERED = 60_000  # points where no grid resolves the posterior
 KERNELS = 600  # about which these lie
-NEIGHBOUR = 8  # the one whose distance is a kernel's sd
-SCALES = (0.5, 0.5, 1.5, 5.0)  # that times these: posteriors that err are resolved, too
+NEIGHBOURS = 16  # whose covariance about it a kernel has
+SCALES = (0.7, 0.7, 1.5, 4.0)  # of kernels' sds: posteriors that err are resolved, too
 PRIOR_SHARE = 0.2  # of points that are draws of the prior
 LEVEL = 0.9  # of the intervals whose coverage is scored
 
@@ -102,17 +102,17 @@ def _scatter(task: Task, observed: np.ndarray) -> Reference:
         values = likelihood(observed, task.theta(points))
         power = _power(values, volume)
         mass = _normalised(power * values, volume)
-        if power == 1.0 and 1.0 / np.sum(mass**2) > SCATTERED / 30:
+        if power == 1.0 and 1.0 / np.sum(mass**2) > SCATTERED / 15:
             return Reference(points, volume, mass)
         points, volume = _mixture(rng, points, mass, task.bounds)
     raise RuntimeError(f"the posterior of {task.name} was not found in {ROUNDS} rounds of points")
 
 
 def _power(values: np.ndarray, volume: np.ndarray) -> float:
-    """The largest power of the likelihood, up to 1, that leaves some kernels' worth of points."""
+    """The largest power of the likelihood, up to 1, that leaves many points their weight."""
     powers = np.append(np.geomspace(1e-12, 1.0, 300), 1.0)
     effective = [1.0 / np.sum(_normalised(p * values, volume) ** 2) for p in powers]
-    return float(powers[np.flatnonzero(np.array(effective) > 2 * KERNELS)[-1]])
+    return float(powers[np.flatnonzero(np.array(effective) > KERNELS / 2)[-1]])
 
 
 def _mixture(
@@ -120,26 +120,29 @@ def _mixture(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points [n, d] of kernels about draws of `points` and of the prior; their prior masses [n].
 
-    A kernel is as wide as its neighbours are far, so that kernels follow ridges and modes.
+    A kernel has its neighbours' covariance, so that kernels follow ridges and modes.
     """
     n, d = SCATTERED, points.shape[1]
     mean = mass @ points
-    factor = np.linalg.cholesky((points - mean).T @ (mass[:, None] * (points - mean)))
-    chosen = rng.choice(len(points), KERNELS, replace=False, p=mass)
-    centres = np.linalg.solve(factor, points[chosen].T).T
-    sd = np.sort(cdist(centres, centres), axis=1)[:, NEIGHBOUR] * np.resize(SCALES, KERNELS)
+    scale = np.sqrt(mass @ (points - mean) ** 2)
+    centres = points[rng.choice(len(points), KERNELS, replace=False, p=mass)] / scale
+    nearest = np.argsort(cdist(centres, centres), axis=1)[:, 1 : NEIGHBOURS + 1]
+    apart = centres[nearest] - centres[:, None]
+    covariance = np.einsum("kni,knj->kij", apart, apart) / NEIGHBOURS + 1e-12 * np.eye(d)
+    factors = np.linalg.cholesky(covariance) * np.resize(SCALES, KERNELS)[:, None, None]
     of = rng.integers(KERNELS, size=n)
-    drawn = (centres[of] + sd[of, None] * rng.standard_normal((n, d))) @ factor.T
+    drawn = centres[of] + np.einsum("nij,nj->ni", factors[of], rng.standard_normal((n, d)))
+    low, high = bounds.T / scale
     anywhere = rng.uniform(size=n) < PRIOR_SHARE
-    drawn[anywhere] = rng.uniform(*bounds.T, (n, d))[anywhere]
-    drawn = drawn[((drawn >= bounds[:, 0]) & (drawn <= bounds[:, 1])).all(axis=1)]
-    white, density = np.linalg.solve(factor, drawn.T).T, np.zeros(len(drawn))
-    for centre, width in zip(centres, sd):  # noqa: B905  older Pythons
-        squares = np.sum((white - centre) ** 2, axis=1) / width**2
-        density += np.exp(-0.5 * squares) / (np.sqrt(2.0 * np.pi) * width) ** d
-    density *= np.prod(np.ptp(bounds, axis=1)) / np.prod(np.diag(factor)) / KERNELS
-    volume = 1.0 / (PRIOR_SHARE + (1.0 - PRIOR_SHARE) * density)  # over the prior's density
-    return drawn, volume / volume.sum()
+    drawn[anywhere] = rng.uniform(low, high, (n, d))[anywhere]
+    drawn = drawn[((drawn >= low) & (drawn <= high)).all(axis=1)]
+    density = np.zeros(len(drawn))
+    for centre, factor in zip(centres, factors):  # noqa: B905  older Pythons
+        white = np.linalg.inv(factor) @ (drawn - centre).T
+        density += np.exp(-0.5 * np.sum(white**2, axis=0)) / np.prod(np.diag(factor))
+    density *= np.prod(high - low) / KERNELS / (2.0 * np.pi) ** (d / 2)  # over the prior's
+    volume = 1.0 / (PRIOR_SHARE + (1.0 - PRIOR_SHARE) * density)
+    return drawn * scale, volume / volume.sum()
 
 
 def score(log_density: np.ndarray, reference: Reference) -> Score:
