@@ -24,7 +24,7 @@ PEERS_SUPPORTED := import sys, ensurepip; sys.exit(not (3, 9) <= sys.version_inf
 
 .DELETE_ON_ERROR:
 
-.PHONY: setup demo browser test test-long physics against paper lint peers clean
+.PHONY: setup demo dist browser test test-long physics against paper lint peers clean
 
 setup: $(INSTALLED)
 
@@ -77,6 +77,10 @@ against: setup
 	REFERENCE="$(REFERENCE)" CELL="$(CELL)" RESULTS=$(or $(RESULTS),runs/against) $(BIN)/pytest -s \
 		-m benchmark -o faulthandler_timeout=0 $(if $(CASE),-k "$(CASE)") \
 		tests/benchmarks/against/test_against.py
+
+# sdist and wheel, tried outside the clone
+dist: setup
+	.ci/dist
 
 lint: setup
 	$(BIN)/ruff check

@@ -257,10 +257,8 @@ def test_page_shows_the_criticism_before_the_pour(criticised):
     facts = {"criticism": criticism_facts(bl.Criticism.open(criticised))}
     for part in ("verdict", "criticism", "gap", "where", "undetectable"):
         for paragraph in prose(part, facts):
-            assert (
-                page.count(f">{html.escape(paragraph, quote=False)}".replace("'", "&#39;")) == 1
-            )
-    assert page.index("Where they differ") < page.index("<h2>The pour")
+            assert page.count(f">{html.escape(paragraph, quote=False)}".replace("'", "&#39;")) == 1
+    assert page.index("Where they differ") < page.index('<h2 id="pour">')
     how = page[page.index("How this was made") :]
     assert "77 simulations" in how
     for text in ("clean.nc", "abc123", "camera_delay", "camera_tilt", "held_out"):
