@@ -47,12 +47,12 @@ class Step(NamedTuple):
     seconds: float
 
 
-# CPU seconds of a run in all its processes (60, 125, 15, 20), three in four of them in parallel
+# a run's CPU seconds in all its processes are 55, 140, 15 and 25; two processors share most of them
 STEPS = (
     Step("calibrate", "20 simulated stirs search for the liquid, 20 check what was found", 40),
-    Step("criticise", "some 80 simulated stirs test which effect the simulator lacks", 80),
-    Step("pour", f"{POURS} simulated pours choose one for the liquid with this effect", 10),
-    Step("report", "six films of stirs and pours", 15),
+    Step("criticise", "some 80 simulated stirs test which effect the simulator lacks", 100),
+    Step("pour", f"{POURS} simulated pours choose one for the liquid with this effect", 12),
+    Step("report", "six films of stirs and pours", 18),
 )
 
 
