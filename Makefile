@@ -26,7 +26,7 @@ PEER_SUPPORTED = import sys, ensurepip; sys.exit("%d.%d" % sys.version_info[:2] 
 
 .DELETE_ON_ERROR:
 
-.PHONY: setup demo browser test test-long docs physics against paper lint peers clean
+.PHONY: setup demo dist browser test test-long docs physics against paper lint peers clean
 
 setup: $(INSTALLED)
 
@@ -84,6 +84,10 @@ against: setup
 	REFERENCE="$(REFERENCE)" CELL="$(CELL)" RESULTS=$(or $(RESULTS),runs/against) $(BIN)/pytest -s \
 		-m benchmark -o faulthandler_timeout=0 $(if $(CASE),-k "$(CASE)") \
 		tests/benchmarks/against/test_against.py
+
+# sdist and wheel, tried outside the clone
+dist: setup
+	.ci/dist
 
 lint: setup
 	$(BIN)/ruff check

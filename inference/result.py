@@ -187,7 +187,7 @@ class Fit(Displayed):
         failed = ", ".join(f"{n} {kind}" for kind, n in self.failures.items())
         surrogate = f"{self.settings['surrogate']!r}, of {self.training_mask.sum()} simulations"
         return [
-            ("parameters", ", ".join(self._quantiles())),
+            ("parameters", ", ".join(self._intervals())),
             ("interval ends", self._interval_ends()),
             ("simulations", f"{len(self.history.theta)}, failed: {failed or 'none'}"),
             ("discrepancy", self._discrepancies()),
@@ -196,14 +196,19 @@ class Fit(Displayed):
             ("warnings", "; ".join(self.warnings) or "none"),
         ]
 
-    def _quantiles(self) -> list[str]:
+    @in_float64
+    def quantiles(self, levels: tuple[float, ...] = (0.05, 0.5, 0.95)) -> dict[str, np.ndarray]:
+        """Quantiles of each parameter's posterior at these levels, without sampling: of the
+        weighted points of `population`."""
+        theta, weights = self.prior.from_unit(ndtr(self.population.x)), self.population.weights
+        return {name: weighted_quantiles(values, weights, levels) for name, values in theta.items()}
+
+    def _intervals(self) -> list[str]:
         """Median and 90 % interval of each parameter."""
-        theta = self.prior.from_unit(ndtr(self.population.x))
-        weights, said = self.population.weights, []
-        for name, values in theta.items():
-            low, middle, high = weighted_quantiles(values, weights, (0.05, 0.5, 0.95))
-            said.append(f"{name} {middle:.4g} ({low:.4g} to {high:.4g})")
-        return said
+        return [
+            f"{name} {middle:.4g} ({low:.4g} to {high:.4g})"
+            for name, (low, middle, high) in self.quantiles().items()
+        ]
 
     def _interval_ends(self) -> str:
         """How well they are known, and what ten more runs would bring."""
