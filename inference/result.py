@@ -39,11 +39,12 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import ndtr
 
 from ._float64 import in_float64
 from ._lazy import xr
-from .arguments import check_flag, check_kind, checked_integer, require
+from .arguments import check_flag, check_kind, checked_array, checked_integer, require
 from .history import History
 from .interval_error import interval_error
 from .notebook_display import Displayed
@@ -197,11 +198,18 @@ class Fit(Displayed):
         ]
 
     @in_float64
-    def quantiles(self, levels: tuple[float, ...] = (0.05, 0.5, 0.95)) -> dict[str, np.ndarray]:
+    def quantiles(self, levels: ArrayLike = (0.05, 0.5, 0.95)) -> dict[str, np.ndarray]:
         """Quantiles of each parameter's posterior at these levels, without sampling: of the
-        weighted points of `population`."""
+        weighted points of `population`.
+
+        Raises:
+            ValueError: levels that are not numbers from 0 to 1.
+        """
+        shares = np.atleast_1d(checked_array("levels", levels))
+        within = bool(((shares >= 0.0) & (shares <= 1.0)).all())
+        require(within, "levels", "lie between 0 and 1", levels)
         theta, weights = self.prior.from_unit(ndtr(self.population.x)), self.population.weights
-        return {name: weighted_quantiles(values, weights, levels) for name, values in theta.items()}
+        return {name: weighted_quantiles(values, weights, shares) for name, values in theta.items()}
 
     def _intervals(self) -> list[str]:
         """Median and 90 % interval of each parameter."""

@@ -243,7 +243,7 @@ def resampled(rng: np.random.Generator, found: Population, n: int) -> np.ndarray
 
 
 def weighted_quantiles(
-    values: np.ndarray, weights: np.ndarray, shares: Sequence[float]
+    values: np.ndarray, weights: np.ndarray, shares: Sequence[float] | np.ndarray
 ) -> np.ndarray:
     """Quantiles [len(shares)] of weighted values [n]."""
     order = np.argsort(values)

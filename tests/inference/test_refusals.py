@@ -98,6 +98,7 @@ def cases():
         "Fit.report": (fit.report, {"path": Path(tempfile.mkdtemp()) / "fit.html"}),
         "Fit.save": (fit.save, {"path": Path(tempfile.mkdtemp()) / "fit"}),
         "Fit.sobol": (fit.sobol, {"n": 64}),
+        "Fit.quantiles": (fit.quantiles, {"levels": (0.1, 0.9)}),
         "Fit.interval_error": (fit.interval_error, {"more": 3}),
         "Until": (inference.Until, {"tolerance": 0.1, "most": 30, "error": len}),
         "Prior": (inference.Prior, {"distributions": {"a": dist.Uniform(0.0, 1.0)}}),
@@ -246,6 +247,7 @@ VALUES = {
             dist.VonMises(0.0, 1.0),
         )
     ],
+    "Fit.quantiles": [{"levels": (0.1, 1.1)}, {"levels": np.nan}],
     "Fit.interval_error": [{"more": -1}],
     "Until": [{"tolerance": 0.0}, {"tolerance": np.inf}, {"most": 2}],
     "Fit.sobol": [{"n": 1000}, {"n": 1}, {"n": 64.5}, {"seed": -1}],
