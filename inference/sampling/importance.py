@@ -248,7 +248,7 @@ def weighted_quantiles(
     """Quantiles [len(shares)] of weighted values [n]."""
     order = np.argsort(values)
     reached = np.cumsum(weights[order])
-    return np.interp(shares, reached / reached[-1], values[order])
+    return np.interp(np.asarray(shares), reached / reached[-1], values[order])
 
 
 class _Points(NamedTuple):
