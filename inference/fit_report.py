@@ -13,7 +13,6 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .arguments import check_kind
 from .figures import COLOURS, GREY, INK, bare
 
 TEMPLATE = "fit_report.html.jinja"
@@ -22,10 +21,11 @@ SIZE = 4.2, 2.6  # inch
 LINE = 5  # values from which an output is drawn as a line
 MOST_CHANNELS = 6  # that are drawn
 NEXT = {
-    "fitted": "The posterior can be used. fit.check() measures on data of known truth whether its "
-    "intervals cover what they should; fit.sobol() says which parameters the output depends on.",
-    "not confirmed": "Simulate more: repeat the call of fit with a larger budget and the same "
-    "bank, which goes on where it ended. Until then the posterior may be off.",
+    "fitted": "The posterior can be used. Of a fit that has its simulator, fit.check() measures on "
+    "data of known truth whether its intervals cover what they should.",
+    "not confirmed": "Simulate more. A call of fit with a larger budget and the same bank goes on "
+    "where it ended; trials of an optimiser are given as earlier= beside their simulator. Until "
+    "then the posterior may be off.",
     "not fitted": "Do not use the posterior: no parameters explain what was observed. "
     "fit.criticise(extensions) looks for what the simulator lacks; look at the data, too, and at "
     "noise=, which may be too small.",
@@ -57,7 +57,6 @@ class Row(NamedTuple):
 
 def write_report(path: str | Path, fit: Any, tree: Any) -> Path:
     """See `Fit.report`; `fit` is one, `tree` what it sampled."""
-    check_kind("path", path, str | Path)
     checks = tree["emulator_checks"]
     z = checks["loo_z"].to_numpy() if "loo_z" in checks else np.zeros(0)
     checked = np.isfinite(z).any()
@@ -104,24 +103,28 @@ def _picture(draw: Callable[[Axes], None], alt: str, caption: str) -> Picture:
 def _marginal(fit: Any, tree: Any, name: str) -> Picture:
     draws = tree["posterior"][name].to_numpy().ravel()
     low, middle, high = np.quantile(draws, SHARES)
-    ends = fit.prior.from_unit(np.tile([[1e-3], [1.0 - 1e-3]], len(fit.prior)))[name]
+    ends = fit.prior.from_unit(np.tile([[0.0], [1.0]], len(fit.prior)))[name]
     reach = 1.5 * (high - low)
     first, last = np.clip([middle - reach, middle + reach], *ends)
     x = np.linspace(first, last, 200)
-    median = fit.prior.from_unit(np.full(len(fit.prior), 0.5))
-    at = {other: np.full(x.size, value) for other, value in median.items()} | {name: x}
-    density = np.exp(fit.prior.log_probs(at)[name])
+    density = None  # a model of dependent parameters has none of one alone
+    if fit.prior.model is None:
+        median = fit.prior.from_unit(np.full(len(fit.prior), 0.5))
+        at = {other: np.full(x.size, value) for other, value in median.items()} | {name: x}
+        density = np.exp(fit.prior.log_probs(at)[name])
 
     def draw(ax: Axes) -> None:
         ax.hist(draws, 40, range=(x[0], x[-1]), density=True, color=COLOURS[0], alpha=0.6)
-        ax.plot(x, density, color=GREY, label="prior")
+        if density is not None:
+            ax.plot(x, density, color=GREY, label="prior")
+            ax.legend(frameon=False, fontsize="small", labelcolor=INK)
         label = f"{name} [{fit.prior.units[name]}]" if name in fit.prior.units else name
         ax.set_xlabel(label, parse_math=False)
         ax.set_yticks([])
-        ax.legend(frameon=False, fontsize="small", labelcolor=INK)
 
+    line = "" if density is None else ", and a line for its prior"
     said = f"Half of the draws of {name} lie below {middle:.4g}, 90 % from {low:.4g} to {high:.4g}."
-    return _picture(draw, f"Histogram of the posterior of {name}, and a line for its prior", said)
+    return _picture(draw, f"Histogram of the posterior of {name}{line}", said)
 
 
 def _outputs(tree: Any) -> Iterator[Picture]:

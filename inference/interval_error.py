@@ -1,4 +1,4 @@
-"""How far the surrogate's doubt may move the posterior's intervals."""
+"""Error of the posterior's intervals that the surrogate's uncertainty allows."""
 
 import numpy as np
 from scipy.special import ndtr
@@ -8,18 +8,23 @@ from .surrogates.base import Surrogate
 from .types import LogLikelihood
 
 POINTS = 400  # of the posterior, at which simulators are drawn together
-REALISATIONS = 64  # simulators that the runs allow
+REALISATIONS = 64  # draws of what is emulated
 ENDS = 0.05, 0.95  # of a 90 % interval
 
 
 def interval_error(found: Population, was: LogLikelihood, learned: Surrogate) -> float:
-    """Root mean square, over simulators that the runs allow, of the difference between an end of
-    the 90 % interval if the simulator were known and the end that is reported; the largest of all
-    parameters' ends, in the posterior's sds. Both are taken in prior quantiles.
+    """Error of the ends of 90 % intervals, the largest of all parameters', in the posterior's sds.
+
+    It is the root mean square difference between the reported end and that under a draw of what is
+    emulated; and, to that, the difference to the end under the surrogate's `sure` likelihood, in
+    which what no repeated run bears out as noise is no noise. All are taken in prior quantiles.
 
     Args:
         found: The posterior of the likelihood `was`.
-        learned: The surrogate that allows the simulators and reports the ends.
+        learned: The surrogate that reports the ends.
+
+    Returns:
+        NaN where the surrogate has no `realisations`.
     """
     rng = np.random.default_rng(0)
     places = (np.arange(POINTS) + 0.5) / POINTS
@@ -30,8 +35,11 @@ def interval_error(found: Population, was: LogLikelihood, learned: Surrogate) ->
     u, log_weights = ndtr(found.x[which]), np.log(counts) - was(ndtr(found.x[which]))
     reported = _ends(u, log_weights + learned.log_likelihood(u))
     known = learned.realisations(rng, u, REALISATIONS)
+    if np.isnan(known).any():
+        return np.nan
     missed = np.stack([_ends(u, log_weights + one) for one in known]) - reported
-    return float(np.max(np.sqrt(np.mean(missed**2, 0)) / _sd(u, counts)))
+    without = _ends(u, log_weights + learned.sure(u)) - reported
+    return float(np.max(np.sqrt(np.mean(missed**2, 0) + without**2) / _sd(u, counts)))
 
 
 def _ends(u: np.ndarray, log_weights: np.ndarray) -> np.ndarray:

@@ -108,7 +108,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
             is stored when its call is finished, and what another run is simulating for the same
             bank at the same time is waited for.
         identity: Names the simulator and its settings in the bank. Anything that changes
-            the signals for equal theta and seed must change it.
+            the signals for equal theta and seed must change it. A `Program`'s is its command and
+            the names of its functions, unless one is given; not the program's version.
         timeout: Seconds that one simulation may take; those of one call together as many times
             as long, and if it fails they are tried one by one. `simulate` then runs in a
             thread, which is abandoned, not stopped, when it is overdue: see `job.within`.
@@ -176,6 +177,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     if budget or simulate is not None:
         check_function("simulate", simulate)
     simulator = for_engine(simulate, vectorised, together, time_limit)
+    identity = identity or getattr(simulator, "identity", "")
     told = _length(checked_prior(prior), earlier)
     due = f"hold {MOST_SIMULATIONS - budget} simulations at most with budget={budget}"
     require(
@@ -219,7 +221,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
                 **({} if earlier is None else {"earlier": earlier}),
                 "confirm": confirm,
             }
-            engine.recipe = Recipe(simulator, identity, budget, own, fit, _check, _criticise)
+            engine.recipe = Recipe(
+                simulator, identity, until or budget, own, fit, _check, _criticise
+            )
         made = engine.fit({"simulator": seconds}, warn=False)
         if simulate is None and made.learned.unreached:  # a table of losses, not of outputs
             raise ValueError(made.learned.unreached[0])

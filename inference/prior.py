@@ -139,7 +139,9 @@ class Prior:
     @in_float64
     def _check_model(self) -> None:
         """Raise ValueError unless a model's parameters have quantiles for arrays of them, too."""
-        u = np.random.default_rng(0).random((64, len(self)))
+        rng = np.random.default_rng(0)
+        ends = rng.choice([TAIL_QUANTILE, 0.5, 1.0 - TAIL_QUANTILE], (64, len(self)))
+        u = np.concatenate([rng.random((64, len(self))), ends])
         told = "its distributions for arrays are others than for numbers, or end before they begin"
         try:
             theta = self.from_unit(u)

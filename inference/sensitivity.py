@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._lazy import stats, xr
+from .arguments import require
 from .prior import Prior
 from .sampling.target import BATCH
 from .sobol import sobol
@@ -18,6 +19,8 @@ MIN_VARIANCE = 1e-12  # of a value, over its squared size: less is rounding
 
 def sobol_indices(prior: Prior, learned: Surrogate, n: int, seed: int) -> "xarray.Dataset":
     """See `Fit.sobol`."""
+    due = "have independent parameters for Sobol indices"
+    require(prior.model is None, "prior", due, prior)
     d = len(prior)
     points = sobol(seed, 0, n, 2 * d)
     one, other = points[:, :d], points[:, d:]

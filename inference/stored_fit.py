@@ -6,6 +6,7 @@ which says how the fit was made.
 
 import json
 import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,11 @@ SAME = 1e-3  # relative, up to which what is learned again is what was learned
 MADE = "fit.json"
 SCALARS = bool, int, float, str, type(None)
 OF_HISTORY = "theta", "seeds", "rounds", "discrepancy"
+# of a file that is none of ours, or damaged
+UNREADABLE = (
+    *(ValueError, TypeError, AttributeError, KeyError, EOFError, NotImplementedError),
+    *(zipfile.BadZipFile, zlib.error),
+)
 
 
 def write_fit(path: str | Path, fit: Any) -> Path:
@@ -58,11 +64,14 @@ def write_fit(path: str | Path, fit: Any) -> Path:
         made["before"] = {"told": before.told, "asked": before.asked}
     path = Path(path)
     part = path.with_name(f"{path.name}.part")  # a crash leaves no half of a file
-    with part.open("wb") as file:
-        np.savez_compressed(file, allow_pickle=False, **arrays)
-    with zipfile.ZipFile(part, "a", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr(MADE, json.dumps(made, indent=1))
-    return part.replace(path)
+    try:
+        with part.open("wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays)
+        with zipfile.ZipFile(part, "a", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr(MADE, json.dumps(made, indent=1))
+        return part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def read_fit(
@@ -120,7 +129,7 @@ def _opened(path: str | Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         made = json.loads(arrays.pop(MADE))
-    except (ValueError, AttributeError, KeyError, zipfile.BadZipFile, EOFError) as error:
+    except UNREADABLE as error:
         raise ValueError(f"path must be a file of Fit.save, got {str(path)!r}") from error
     version = made["engine_version"]
     if version != ENGINE_VERSION:

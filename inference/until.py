@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arguments import check_callable, checked_integer, checked_number
+from .arguments import check_callable, checked_integer, checked_number, require
 from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
 from .result import Fit
 
@@ -16,12 +16,12 @@ EVERY = 5  # simulations between two looks
 class Until:
     """A budget of `fit` that ends when the posterior is known well enough.
 
-    That is looked at after the start design, every fifth simulation. What a fit warns of goes on to
-    `most`.
+    That is looked at after the start design, every fifth simulation. A fit with warnings goes on to
+    `most` simulations.
 
     Attributes:
         tolerance: Of the error.
-        most: Simulations in all.
+        most: Simulations, those at draws of the posterior not counted.
         error: What shall be below the tolerance, from a fit: None is `Fit.interval_error`; or the
             expected regret of what is to be decided, in its own units.
 
@@ -30,7 +30,7 @@ class Until:
     """
 
     tolerance: float = 0.25
-    most: int = 100
+    most: int = 60
     error: Callable[[Fit], float] | None = None
 
     def __post_init__(self) -> None:
@@ -39,8 +39,8 @@ class Until:
         check_callable("error", self.error)
 
     def _reached(self, made: Fit) -> bool:
-        """Whether a fit is known well enough, and nothing about it is complained of: an emulator
-        that predicts nothing is sure of that."""
+        """Whether a fit is known well enough and has no warnings: an emulator that predicts nothing
+        has no uncertainty either."""
         error = made.interval_error() if self.error is None else float(self.error(made))
         return error <= self.tolerance and not made.warnings
 
@@ -54,6 +54,8 @@ def checked_budget(budget: object, least: int) -> tuple[int, Until | None]:
     until = Until() if isinstance(budget, str) and budget == "auto" else budget
     if isinstance(until, Until):
         return until.most, until
+    due = f'be "auto", an Until or an integer from {least} to {MOST_SIMULATIONS}'
+    require(not isinstance(budget, str), "budget", due, budget)
     return checked_integer("budget", budget, least, MOST_SIMULATIONS), None
 
 

@@ -124,10 +124,12 @@ class OneByOne:
     Attributes:
         simulate: Callable (theta: name -> float, seed) -> signal [*signal_shape].
         time_limit: See `BatchSimulator`.
+        identity: Its name in a bank where `fit` is given none.
     """
 
     simulate: SingleSimulator
     time_limit: Limit | None = field(default=None, compare=False)
+    identity: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
         check_callable("time_limit", self.time_limit)

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import check_callable, check_kind, check_text, require
+from ..describe import describe
 from .job import OneByOne
 
 FILES = frozenset({"in", "out"})
@@ -80,7 +81,8 @@ class Program(OneByOne):
         check_kind("keep", keep, str | os.PathLike | None)
         folder = None if keep is None else Path(keep).absolute()
         here = tuple(map(_from_here, words))
-        super().__init__(_Run(here, tuple(sorted(named)), write, read, folder), _limited)
+        run = _Run(here, tuple(sorted(named)), write, read, folder)
+        super().__init__(run, _limited, describe(run))
 
 
 @dataclass(frozen=True)
@@ -159,13 +161,12 @@ def _execute(words: Sequence[str], directory: Path) -> None:
         )
         try:
             code = program.wait(None if ends is None else max(ends - time.monotonic(), 0.0))
-        except BaseException as error:  # overdue, or interrupted by a person
+        except subprocess.TimeoutExpired as error:
+            raise TimeoutError("overdue") from error
+        finally:  # what the program left running, too, and if a person interrupts
             with suppress(ProcessLookupError):
                 os.killpg(program.pid, signal.SIGKILL)
             program.wait()
-            if isinstance(error, subprocess.TimeoutExpired):
-                raise TimeoutError("overdue") from error
-            raise
     if code:
         how = f"exit code {code}" if code > 0 else f"signal {signal.Signals(-code).name}"
         raise RunFailed(f"{words[0]} ended with {how}")
@@ -210,7 +211,11 @@ def _parsed(
     """Words of a text, and what they have in braces."""
     try:
         words = split(text)
-        fields = [name for word in words for _, name, _, _ in Formatter().parse(word)]
+        parts = [part for word in words for part in Formatter().parse(word)]
     except ValueError as error:
         raise ValueError(f"{argument} cannot be read ({error}), got {text!r}") from error
-    return words, frozenset(name for name in fields if name is not None)
+    named = frozenset(name for _, name, _, _ in parts if name is not None)
+    plain = all(name.isidentifier() for name in named)
+    plain = plain and not any("{" in (form or "") for _, _, form, _ in parts)
+    require(plain, argument, "have names in braces, such as {a} or {a:.3f}", text)
+    return words, named

@@ -99,8 +99,9 @@ class Surrogate(Protocol):
         return known if runs is None else np.repeat(known[:, None], len(runs), axis=1)
 
     def realisations(self, rng: np.random.Generator, u: np.ndarray, n: int) -> np.ndarray:
-        """Log likelihoods [n, m] at different u [m, d] under n simulators that the runs allow."""
-        return np.repeat(np.asarray(self.log_likelihood(u))[None], n, axis=0)
+        """Log likelihoods [n, m] at different u [m, d], each row under one draw of what is
+        emulated; NaN where that cannot be drawn."""
+        return np.full((n, len(u)), np.nan)
 
     def log_success(self, u: np.ndarray) -> np.ndarray:
         """Log probability [n] that a run at u [n, d] succeeds."""

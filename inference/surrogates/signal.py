@@ -282,7 +282,7 @@ class SignalSurrogate(OfProcesses):
 
     @property
     def log_constant(self) -> float:
-        return 0.0 if self.emulator.equal else self.lost + float(self._log_slopes.sum())
+        return np.nan if self.emulator.equal else self.lost + float(self._log_slopes.sum())
 
     @property
     def log_variance(self) -> float:

@@ -57,7 +57,48 @@ def test_it_stops_where_a_fixed_budget_would_have_come_to_the_same():
     early = fitted(decay, budget="auto")
     again = fitted(decay, budget=len(early.history.theta))
     np.testing.assert_array_equal(early.history.theta, again.history.theta)
-    assert early.recipe.budget == again.recipe.budget
+    assert early.recipe.budget == inference.Until()  # a replicate ends by itself, too
+
+
+def test_what_components_leave_is_no_noise_where_repeated_runs_agree():
+    """Of a deterministic simulator that few components make badly."""
+
+    def waves(theta, seeds):
+        return theta["height"][:, None] * np.sin(4.0 * theta["rate"][:, None] * TIMES)
+
+    truth = {"height": np.array([2.0]), "rate": np.array([0.7])}
+    observed = waves(truth, None)[0] + NOISE * np.random.default_rng(0).normal(size=TIMES.size)
+    fit = inference.fit(
+        waves, PRIOR, observed, noise=NOISE, budget=40, confirm=0, warn=False, progress=False
+    )
+    u = np.random.default_rng(0).random((200_000, 2)) * (0.2, 0.02) + (0.4, 0.305)
+    missed = waves(PRIOR.from_unit(u), None) - observed
+    mass = np.exp(-0.5 * np.sum(missed**2, axis=1) / NOISE**2)
+    exact_sd = np.sqrt(np.cov(u.T, aweights=mass).diagonal())
+    found = fit.prior.to_unit(fit.quantiles((0.05, 0.95)))
+    too_wide = np.max((found[1] - found[0]) / (3.29 * exact_sd))
+    assert too_wide > 1.5  # or this shows nothing
+    assert fit.interval_error() > 0.25
+
+
+def test_a_family_of_one_s_own_is_not_known_to_be_known():
+    class Silent(inference.SignalFamily):
+        def learn(self, data, key):
+            found = super().learn(data, key)
+            object.__setattr__(
+                found, "realisations", lambda rng, u, n: np.full((n, len(u)), np.nan)
+            )
+            return found
+
+    fit = inference.fit(
+        *(decay, PRIOR, OBSERVED),
+        surrogate=Silent(noise=NOISE),
+        budget=inference.Until(most=20),
+        **{"confirm": 0, "warn": False, "progress": False},
+    )
+    assert np.isnan(fit.interval_error())
+    assert len(fit.history.theta) == 20
+    assert "interval ends" not in repr(fit)
 
 
 @pytest.mark.parametrize("in_rounds", [True, False])

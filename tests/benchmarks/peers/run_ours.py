@@ -12,13 +12,13 @@ import jax
 import numpy as np
 import numpyro.distributions as dist
 from bolfi_liquids.inference.engine_version import ENGINE_VERSION
+from bolfi_liquids.inference.simulations.job import BATCH
 from tasks import Task
 
 from bolfi_liquids import inference
 
 from .job import Job, Stopwatch, conclude, load, receive, write
 
-BATCH = 2  # points asked at once, `inference.fit`'s default
 WINDOW = 10  # simulations from a budget on over which the median cost of a step is taken
 CALL = {"confirm": 0, "warn": False, "progress": False}  # runs at draws would come on top of N
 COMPILED = "/jax/core/compile/backend_compile_duration"
