@@ -8,6 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
+import numpyro.distributions as dist
 import optuna
 import pytest
 
@@ -211,3 +212,21 @@ with TestClusterExecutor(resource_dict={"cores": 1}, cache_directory="jobs") as 
 def test_executors_of_the_cluster_page(tmp_path):
     """In a process of its own: importing executorlib warns."""
     subprocess.run([sys.executable, "-c", EXECUTORS], cwd=tmp_path, check=True, timeout=120)
+
+
+def test_a_discrepancy_of_your_own(tmp_path, monkeypatch):
+    imports = section("simulator", "Parameters").split("\n\n\ndef")[0] + "\n```"
+    made = run(imports + section("simulator", "Surrogates"), tmp_path, monkeypatch)
+    prior = inference.Prior({"a": dist.Uniform(0, 2)})
+    data = np.linspace(0, 1, 40) + np.random.default_rng(0).normal(0, 0.1, 40)
+    fit = inference.fit(
+        lambda theta, seeds: theta["a"][:, None] * np.linspace(0, 1, 40),
+        prior,
+        data,
+        surrogate=made["own"],
+    )
+    a = fit.simulations["a"].to_numpy()[:, None]
+    squares = np.sum((a * np.linspace(0, 1, 40) - data) ** 2, axis=1)
+    assert np.allclose(fit.history.discrepancy, squares)
+    slope, sd = np.linalg.lstsq(np.linspace(0, 1, 40)[:, None], data)[0][0], 0.1 / np.sqrt(13.5)
+    assert_near(moments(fit.sample("quadrature")["posterior"]), {"a": (slope, sd)}, 0.5, 1.5)
