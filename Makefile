@@ -20,11 +20,13 @@ ALONE_IN = $(shell grep -rlE 'mark\.(punctual|alone)' tests --include='test_*.py
 SHARED := -n logical --maxprocesses 4 --dist worksteal
 
 PEERS := .venv-peers
-PEERS_SUPPORTED := import sys, ensurepip; sys.exit(not (3, 9) <= sys.version_info[:2] <= (3, 10))
+PEER_PYTHON := 3.12
+$(PEERS)/elfi/.installed: PEER_PYTHON := 3.9
+PEER_SUPPORTED = import sys, ensurepip; sys.exit("%d.%d" % sys.version_info[:2] != "$(PEER_PYTHON)")
 
 .DELETE_ON_ERROR:
 
-.PHONY: setup demo browser test test-long docs physics against paper lint peers clean
+.PHONY: setup demo dist browser test test-long docs physics against paper lint peers clean
 
 setup: $(INSTALLED)
 
@@ -83,6 +85,10 @@ against: setup
 		-m benchmark -o faulthandler_timeout=0 $(if $(CASE),-k "$(CASE)") \
 		tests/benchmarks/against/test_against.py
 
+# sdist and wheel, tried outside the clone
+dist: setup
+	.ci/dist
+
 lint: setup
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
@@ -91,24 +97,23 @@ lint: setup
 paper: $(RUNS)
 	$(BIN)/python -m tests.benchmarks.paper $(FIGURES) $(if $(QUICK),--quick)
 
-# ELFI and sbi cannot be installed beside us, nor beside each other: each has its own old Python.
-peers: $(PEERS)/elfi/.installed $(PEERS)/sbi/.installed
+# Peers cannot all be installed beside us, nor beside each other: each has its own environment.
+peers: $(foreach peer,elfi sbi pyvbmc surmise,$(PEERS)/$(peer)/.installed)
 
 $(PEERS)/%/.installed: tests/benchmarks/peers/%.txt
 	@python=; \
-	for candidate in $(PEERS_PYTHON) python3.9 python3.10 \
-		"$(PYENV_VERSIONS)"/3.9.*/bin/python "$(PYENV_VERSIONS)"/3.10.*/bin/python; do \
-		if "$$candidate" -c "$(PEERS_SUPPORTED)" >/dev/null 2>&1; then python=$$candidate; break; fi; \
+	for candidate in $(PEERS_PYTHON) python$(PEER_PYTHON) \
+		"$(PYENV_VERSIONS)"/$(PEER_PYTHON).*/bin/python; do \
+		if "$$candidate" -c '$(PEER_SUPPORTED)' >/dev/null 2>&1; then python=$$candidate; break; fi; \
 	done; \
 	if [ -z "$$python" ]; then \
-		echo "make: $* needs Python 3.9 or 3.10, found neither on the path nor with pyenv;" \
-			"install one, or name it: make peers PEERS_PYTHON=/path/to/python" >&2; \
+		echo "make: $* needs Python $(PEER_PYTHON), found neither on the path nor with pyenv;" \
+			"install it, or name it: make peers PEERS_PYTHON=/path/to/python" >&2; \
 		exit 1; \
 	fi; \
 	echo "Setting up $(PEERS)/$* with $$("$$python" --version)"; \
 	"$$python" -m venv --clear $(PEERS)/$*
-	$(PEERS)/$*/bin/python -m pip install --quiet --disable-pip-version-check --use-pep517 \
-		-c $< $*
+	$(PEERS)/$*/bin/python -m pip install --quiet --disable-pip-version-check --use-pep517 -r $<
 	@touch $@
 
 clean:

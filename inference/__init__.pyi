@@ -31,3 +31,4 @@ from .surrogates.signal import SignalFamily as SignalFamily
 from .surrogates.squared_difference import squared_difference as squared_difference
 from .surrogates.warnings import EmulatorWarning as EmulatorWarning
 from .trials import from_trials as from_trials
+from .until import Until as Until

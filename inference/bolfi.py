@@ -16,6 +16,7 @@ from .acquisition.rules import chosen, resolve_acquisition
 from .arguments import check_flag, checked_integer, checked_mapping, require
 from .describe import describe
 from .history import UNKNOWN, History, told_errors, told_seeds, told_signals
+from .learning import key_words, learned_from, training_data, training_mask
 from .notebook_display import Displayed
 from .prior import Prior, check_support, checked_prior
 from .result import Fit, Recipe
@@ -23,9 +24,8 @@ from .sampling.confirmation import Before
 from .simulations.failures import Failure, FailureKind, not_finite
 from .simulations.job import BATCH
 from .sobol import sobol, start_size
-from .surrogates.base import Acquisition, Family, RunOutcomes, TrainingData
-from .surrogates.discrepancy import is_outlier
-from .surrogates.families import checked_surrogate, resolve
+from .surrogates.base import Acquisition, Family
+from .surrogates.families import checked_surrogate, plain_options, resolve
 from .surrogates.warnings import complain
 from .types import Theta
 
@@ -181,7 +181,7 @@ class Bolfi(Displayed):
         started = time.perf_counter()
         drawn = fit.population.resample(np.random.default_rng([self.seed, self.asked]), n)
         asked = self.prior.to_array(self.prior.from_unit(ndtr(drawn)))
-        self._before = Before(*fit.population.moments, fit.learned, self.told, asked)
+        self._before = Before(*fit.population.moments, fit.learned, self.told, asked, fit.asked)
         return self._ask(asked, started)
 
     def _ask(self, theta: np.ndarray, started: float) -> dict[str, np.ndarray]:
@@ -204,8 +204,9 @@ class Bolfi(Displayed):
         """theta [n, d] of the engine's choice, `designed` [m, d] being asked with them."""
         points = [point for point, _ in self._pending] + designed.tolist()
         pending = np.reshape(points, (-1, len(self.prior)))
-        words = self._words()
-        found = self.family.search(self._training_data(), words, self._learned)
+        words = key_words(self.seed, self.asked)
+        known = training_data(self._view, self.history, self.prior)
+        found = self.family.search(known, words, self._learned)
         self._learned = checked_surrogate(found, self.family)
         repeated = next_replicate(self.history, pending) if self.family.replicates else None
         parts = [] if repeated is None else [repeated[None]]
@@ -216,22 +217,6 @@ class Bolfi(Displayed):
             u = chosen(self._acquire(key, fantasized, shape[0]), shape)
             parts.append(self.prior.to_array(self.prior.from_unit(u)))
         return np.concatenate(parts)
-
-    def _words(self) -> np.ndarray:
-        """A key of JAX as NumPy makes it: JAX would compile for half a second."""
-        return np.random.SeedSequence([self.seed, self.asked]).generate_state(2)
-
-    @property
-    def _training_mask(self) -> np.ndarray:
-        """Which runs are learned from, bool [n]: no copies, nor what blew up."""
-        return self.history.distinct & ~is_outlier(self.history.discrepancy)
-
-    def _training_data(self) -> TrainingData:
-        history, good = self.history, self._training_mask
-        known = self._view, history.u[good], history.features[good], history.discrepancy[good]
-        # runs that blew up did not succeed
-        succeeded = history.succeeded & ~is_outlier(history.discrepancy)
-        return TrainingData(*known, self.prior.tails, RunOutcomes(history.u, succeeded))
 
     def tell(
         self,
@@ -374,19 +359,21 @@ class Bolfi(Displayed):
                 f"{self.told} told; tell more{self.history.last_error}"
             )
         started = time.perf_counter()
-        learn = in_float64(self.family.learn)
-        fitted = checked_surrogate(learn(self._training_data(), self._words()), self.family)
+        known = training_data(self._view, self.history, self.prior)
+        fitted = learned_from(self.family, known, key_words(self.seed, self.asked))
         self._seconds += time.perf_counter() - started
         made = Fit(
             prior=self.prior,
             observed=self.observed,
             history=self.history,
             learned=fitted,
-            training_mask=self._training_mask,
+            training_mask=training_mask(self.history),
             settings=self.settings,
             seconds={"simulator": 0.0, **measured, "engine": self._seconds},
             before=self._before,
             made_by=self.recipe,
+            asked=self.asked,
+            options=plain_options(self.family),
         )
         if warn:
             complain(made.warnings, stacklevel + 1)

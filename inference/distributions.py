@@ -1,6 +1,6 @@
 """Distributions of numpyro with all that the engine needs, where numpyro itself lacks it too."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -139,3 +139,45 @@ def _transform(transform: Any) -> str:
 def _number(distribution: dist.Distribution, key: str) -> str:
     value = getattr(distribution, key, None)
     return "?" if value is None else f"{float(np.asarray(value)):.7g}"
+
+
+Table = Mapping[str, Any]
+"""Family and arguments of a distribution: texts, numbers, and such a table for another one."""
+
+
+def to_table(distribution: Any) -> Table:
+    """Such as {"family": "LogUniform", "high": 20.0, "low": 0.003}, in which `family` is the name
+    of a distribution of numpyro and the rest are its arguments.
+
+    What is more than its numbers, such as one that is transformed, is lost: see whether the
+    distribution that `from_table` makes is the same.
+
+    Raises:
+        AttributeError, TypeError, ValueError: it has not the numbers that its class names.
+    """
+    family = type(distribution).__name__
+    names = sorted(distribution.arg_constraints)
+    # of a float32 its shortest text: 0.003 stays 0.003
+    table = {name: float(str(getattr(distribution, name))) for name in names}
+    if isinstance(distribution, TRUNCATED):  # by a function of numpyro, whose name is no class's
+        base = to_table(getattr(distribution, "base_dist"))  # noqa: B009  of no common type
+        return {"family": "TruncatedDistribution", "base_dist": base, **table}
+    return {"family": family, **table}
+
+
+def from_table(table: Table) -> dist.Distribution:
+    """The distribution that `to_table` described.
+
+    Raises:
+        ValueError: numpyro knows none by that name.
+        TypeError: it does not take these arguments.
+    """
+    arguments = {
+        key: from_table(value) if isinstance(value, Mapping) else value
+        for key, value in table.items()
+        if key != "family"
+    }
+    family: Any = getattr(dist, str(table.get("family")), None)
+    if family is None:
+        raise ValueError(f"no distribution of numpyro is described by {dict(table)!r}")
+    return family(**arguments)

@@ -77,6 +77,11 @@ class History(NamedTuple):
         """Theta and seed of a run, which should determine its signal."""
         return self.theta[row].tobytes(), int(self.seeds[row])
 
+    def first(self, n: int) -> "History":
+        """The first n simulations."""
+        kept = {name: part[:n] for name, part in self._asdict().items() if name != "observed_shape"}
+        return self._replace(**kept)
+
     def and_then(self, later: "History") -> "History":
         """These simulations and later ones."""
         arrays = set(self._fields) - {"outputs", "observed_shape"}

@@ -41,6 +41,7 @@ from .sobol import start_size
 from .surrogates.base import Acquisition, Family
 from .surrogates.warnings import complain
 from .types import Simulator, SingleSimulator, Theta
+from .until import Until, checked_budget, enough
 
 
 def fit(  # noqa: PLR0913  the one call that most users make
@@ -48,7 +49,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     prior: Prior,
     observed: ArrayLike | None = None,
     *,
-    budget: int = 20,
+    budget: int | str | Until = 20,
     batch: int = BATCH,
     seed: int = 0,
     surrogate: str | Family | None = None,
@@ -93,7 +94,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
             and only so, with surrogate="log_likelihood": `simulate` then returns log likelihoods
             [b], or [b, 2] with the sd of their noise; -inf where the data are impossible.
         budget: Simulations in all, failed ones and those found in the bank included; at most 8192,
-            earlier ones counted.
+            earlier ones counted. Or an `Until`, which ends when the posterior is known well
+            enough; "auto" is `Until()`.
         batch: Points per round, or in flight: as many as the executor has workers.
         seed: Fixes the whole run.
         surrogate, acquisition: See `Bolfi`.
@@ -164,7 +166,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     """
     batch = checked_integer("batch", batch, 1, MOST_SIMULATIONS)
     least = MIN_LEARN if earlier is None else 0
-    budget = checked_integer("budget", budget, least, MOST_SIMULATIONS)
+    budget, until = checked_budget(budget, least)
     confirm = checked_integer("confirm", confirm, 0, MOST_SIMULATIONS)
     confirm = 0 if simulate is None else confirm
     check_progress(progress)
@@ -190,11 +192,6 @@ def fit(  # noqa: PLR0913  the one call that most users make
         initial=initial,
         **options,
     )
-    if simulate is not None:
-        own = {"surrogate": engine.family, "acquisition": acquisition, "initial": engine.initial}
-        own |= {"batch": batch, "in_rounds": in_rounds, "confirm": confirm, "timeout": timeout}
-        own |= {} if earlier is None else {"earlier": earlier}
-        engine.recipe = Recipe(simulator, identity, budget, own, fit, _check, _criticise)
     if earlier is not None:
         engine.tell(*earlier)
     due = f"reach the start design of initial={engine.initial} points"
@@ -208,18 +205,21 @@ def fit(  # noqa: PLR0913  the one call that most users make
             Runner(simulator, compute, shape=engine.expected_shape, identity=identity)
         )
         schedule = _in_rounds if in_rounds else _in_flight
-        finished = schedule(engine, runner, budget, batch)
+        finished = schedule(engine, runner, budget, batch, enough(engine, until))
         seconds = 0.0
         for simulation in finished:
             seconds += simulation.seconds
             advance(1)
-        if engine.succeeded < MIN_LEARN:
-            raise RuntimeError(
-                f"{engine.succeeded} of {engine.told} simulations succeeded, copies counted once; "
-                f"{MIN_LEARN} are needed{engine.history.last_error}. "
-                f"{runner.bank.where}; mend the cause, or raise budget, and repeat the call to go "
-                "on from there"
-            )
+        _check_learnable(engine, runner)
+        budget = engine.told - told
+        if simulate is not None:
+            own = {
+                **{"surrogate": engine.family, "acquisition": acquisition, "timeout": timeout},
+                **{"initial": engine.initial, "batch": batch, "in_rounds": in_rounds},
+                **({} if earlier is None else {"earlier": earlier}),
+                "confirm": confirm,
+            }
+            engine.recipe = Recipe(simulator, identity, budget, own, fit, _check, _criticise)
         made = engine.fit({"simulator": seconds}, warn=False)
         if simulate is None and made.learned.unreached:  # a table of losses, not of outputs
             raise ValueError(made.learned.unreached[0])
@@ -233,6 +233,15 @@ def fit(  # noqa: PLR0913  the one call that most users make
     if warn:
         complain(made.warnings, stacklevel=3)
     return made
+
+
+def _check_learnable(engine: Bolfi, runner: Runner) -> None:
+    if engine.succeeded < MIN_LEARN:
+        raise RuntimeError(
+            f"{engine.succeeded} of {engine.told} simulations succeeded, copies counted once; "
+            f"{MIN_LEARN} are needed{engine.history.last_error}. {runner.bank.where}; mend the "
+            "cause, or raise budget, and repeat the call to go on from there"
+        )
 
 
 def _check(made: Fit, n: int, **how: Any) -> Any:
@@ -317,9 +326,13 @@ def fit_losses(
     return engine.fit(warn=warn, stacklevel=3)
 
 
-def _in_rounds(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterator[Simulation]:
+def _in_rounds(
+    engine: Bolfi, runner: Runner, budget: int, batch: int, stop: Callable[[], bool]
+) -> Iterator[Simulation]:
     """Simulate `batch` points at a time; yields what the engine was told."""
     for first in range(0, budget, batch):
+        if stop():
+            return
         indices = range(first, min(first + batch, budget))
         # whole rounds are asked even if the budget ends before, so that a larger one goes on
         # from the same points
@@ -327,7 +340,9 @@ def _in_rounds(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterat
         yield from _tell(engine, asked, runner.run(asked))
 
 
-def _in_flight(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterator[Simulation]:
+def _in_flight(
+    engine: Bolfi, runner: Runner, budget: int, batch: int, stop: Callable[[], bool]
+) -> Iterator[Simulation]:
     """Keep `batch` simulations going; yields what the engine was told, in the order asked."""
     flying: deque[tuple[Job, Future[Simulation]]] = deque()
 
@@ -336,6 +351,8 @@ def _in_flight(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterat
         return _tell(engine, [job], [runner.result(outcome)])
 
     for index in range(budget):
+        if stop():
+            break
         if len(flying) == batch:
             yield from land()
         (job,) = jobs(engine.ask(1), [simulation_seed(engine.seed, index)])

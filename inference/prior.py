@@ -272,6 +272,13 @@ class Prior:
         return np.where(_inside(natural, given), total, -np.inf)
 
     @in_float64
+    def log_probs(self, theta: Theta) -> dict[str, np.ndarray]:
+        """Log prior density of each parameter in its own unit, name -> [...]; outside the support
+        that at its edge."""
+        given = self._given(self.to_array(theta))
+        return {n: one.log_prob(values) for n, (values, one) in zip(self.names, given, strict=True)}
+
+    @in_float64
     def sample(self, key: jax.Array, n: int) -> dict[str, np.ndarray]:
         """Draw n parameters, name -> [n].
 

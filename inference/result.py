@@ -8,15 +8,25 @@ and 5 and 95 % quantiles, `mcse_mean`, `mcse_q05`, `mcse_q95`. Of the group: `st
 or what is wrong), `rhat_max`, `ess_bulk_min`, `ess_tail_min`, `divergences`, `draws_made` (per
 chain, before thinning); for one or two parameters `quadrature_total_variation` (of 16 equally
 probable bins; independent draws as many as the effective ones stay below
-`quadrature_total_variation_limit`) and `log_evidence` of the surrogate's likelihood.
+`quadrature_total_variation_limit`); `log_evidence` and `log_evidence_error`, see `Fit.evidence`.
 
 sample_stats: `lp`, log density over Phi^-1(u) of the prior quantiles u, and what the sampler
-records. prior: as many draws. observed_data: `signal`. posterior_predictive: what the surrogate
-predicts at some draws, whose indices are its coordinate `draw`. constant_data: the surrogate's
-constants. emulator_checks: the surrogate's own checks for each simulation, NaN where it learned
-nothing from one, and the fit's complaints in the attribute `warnings`. simulations: as
-`Fit.simulations`. The root's attributes hold how the run was made, the seconds it took, and
-`fit_status`.
+records. prior: as many draws. observed_data: `signal`, and where samples of it are missing or
+averaged, or summarised, also the `values` that are compared. posterior_predictive,
+prior_predictive: what the surrogate predicts at each draw, of the same names, or the "discrepancy"
+or "log_likelihood" of a run. log_prior: log density of each parameter in its own units.
+
+log_likelihood: log density of each observed value given all others, which leave-one-out
+cross-validation needs (Buerkner, Gabry and Vehtari 2021): "signal" or "values", or "observed" where
+all that was observed is one datum. These densities do not add up to the likelihood where values
+hang together, by correlated noise, noise of unknown size or the emulator's error; where that shows
+in the draws, "dependence" is what they lack, so that the group's sum is the log likelihood, as
+`az.psense_summary` wants it. `az.loo` and `az.compare` then need `var_name="signal"`.
+
+constant_data: the surrogate's constants. emulator_checks: the surrogate's own checks for each
+simulation, NaN where it learned nothing from one, and the fit's complaints in the attribute
+`warnings`. simulations: as `Fit.simulations`. The root's attributes hold how the run was made, the
+seconds it took, and `fit_status`.
 """
 
 import time
@@ -25,23 +35,35 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import ndtr
 
 from ._float64 import in_float64
 from ._lazy import xr
-from .arguments import check_flag, checked_integer, require
+from .arguments import check_flag, check_kind, checked_array, checked_integer, require
 from .history import History
+from .interval_error import interval_error
 from .notebook_display import Displayed
 from .prior import Prior
 from .sampling.confirmation import Before
 from .sampling.convergence import SamplingWarning, diagnose
 from .sampling.draw import SAMPLERS, Sampled, draw_posterior
-from .sampling.importance import LEAST, Population, explore, weighted_quantiles
+from .sampling.importance import (
+    LEAST,
+    Evidence,
+    Population,
+    evidence_of,
+    explore,
+    weighted_quantiles,
+)
 from .sampling.target import Length, Target, log_likelihood
-from .surrogates.base import Surrogate, SurrogateView
+from .sensitivity import sobol_indices
+from .stored_fit import check_same, read_fit, write_fit
+from .surrogates.base import Family, Surrogate, SurrogateView
 from .surrogates.warnings import (
     COLLAPSED,
     DOUBTED,
@@ -53,7 +75,10 @@ from .types import Simulator, Theta
 
 LEAST_EFFECTIVE = 32.0  # points of a population that stand for a posterior
 MUCH_DOUBT = 1.5  # see `Fit.doubt`: beyond it more is simulated, and a fit warns
-PREDICTED_DRAWS = 50  # draws of each chain for which the surrogate predicts
+TEN_MORE = 10  # runs, of which a printed fit says what they would bring
+NO_DEPENDENCE = (
+    0.1  # nats, sd over draws: what weighs draws by powers of the likelihood hardly sees it
+)
 SAMPLE_DIMS = ("chain", "draw")
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
 
@@ -101,7 +126,10 @@ class Fit(Displayed):
         seconds: Time in the "simulator" and in the "engine" [s].
         before: The posterior of which `Bolfi.confirm` drew last; None where it never did.
         made_by: How it was made; None if not by `fit`, or without a simulator, or if the fit was
-            copied or pickled, for simulators may not be.
+            copied, pickled or loaded, for simulators may not be.
+        asked: Points that had been asked when it was made.
+        options: Those of the surrogate's family that are numbers, texts, arrays or None; None of a
+            family that is not the engine's own.
 
     Example:
         >>> import numpy as np
@@ -133,6 +161,8 @@ class Fit(Displayed):
     seconds: Mapping[str, float]
     before: Before | None = None
     made_by: Recipe | None = None
+    asked: int = 0
+    options: Mapping[str, Any] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "made_by": None}
@@ -146,9 +176,10 @@ class Fit(Displayed):
         """
         if self.made_by is None:
             raise ValueError(
-                "the fit has no simulator: `fit` did not make it from one, or it was copied or "
-                "pickled; check inference.FitPipeline(simulate, prior) by inference.replicates, "
-                "or criticise a criticism.Experiment(simulate, observed, noise)"
+                "the fit has no simulator: `fit` did not make it from one, or it was copied, "
+                "pickled or loaded; check inference.FitPipeline(simulate, prior) by "
+                "inference.replicates, or criticise a "
+                "criticism.Experiment(simulate, observed, noise)"
             )
         return self.made_by
 
@@ -157,7 +188,8 @@ class Fit(Displayed):
         failed = ", ".join(f"{n} {kind}" for kind, n in self.failures.items())
         surrogate = f"{self.settings['surrogate']!r}, of {self.training_mask.sum()} simulations"
         return [
-            ("parameters", ", ".join(self._quantiles())),
+            ("parameters", ", ".join(self._intervals())),
+            ("interval ends", self._interval_ends()),
             ("simulations", f"{len(self.history.theta)}, failed: {failed or 'none'}"),
             ("discrepancy", self._discrepancies()),
             ("surrogate", ", ".join([surrogate, *self.learned.described()])),
@@ -165,14 +197,31 @@ class Fit(Displayed):
             ("warnings", "; ".join(self.warnings) or "none"),
         ]
 
-    def _quantiles(self) -> list[str]:
+    @in_float64
+    def quantiles(self, levels: ArrayLike = (0.05, 0.5, 0.95)) -> dict[str, np.ndarray]:
+        """Quantiles of each parameter's posterior at these levels, without sampling: of the
+        weighted points of `population`.
+
+        Raises:
+            ValueError: levels that are not numbers from 0 to 1.
+        """
+        shares = np.atleast_1d(checked_array("levels", levels))
+        within = bool(((shares >= 0.0) & (shares <= 1.0)).all())
+        require(within, "levels", "lie between 0 and 1", levels)
+        theta, weights = self.prior.from_unit(ndtr(self.population.x)), self.population.weights
+        return {name: weighted_quantiles(values, weights, shares) for name, values in theta.items()}
+
+    def _intervals(self) -> list[str]:
         """Median and 90 % interval of each parameter."""
-        theta = self.prior.from_unit(ndtr(self.population.x))
-        weights, said = self.population.weights, []
-        for name, values in theta.items():
-            low, middle, high = weighted_quantiles(values, weights, (0.05, 0.5, 0.95))
-            said.append(f"{name} {middle:.4g} ({low:.4g} to {high:.4g})")
-        return said
+        return [
+            f"{name} {middle:.4g} ({low:.4g} to {high:.4g})"
+            for name, (low, middle, high) in self.quantiles().items()
+        ]
+
+    def _interval_ends(self) -> str:
+        """How well they are known, and what ten more runs would bring."""
+        now, then = self.interval_error(), self.interval_error(TEN_MORE)
+        return f"known to {now:.2g} sds of the posterior, to {then:.2g} by {TEN_MORE} more runs"
 
     def _discrepancies(self) -> str:
         """Discrepancies of the closest run, and of those at draws of the posterior."""
@@ -267,6 +316,20 @@ class Fit(Displayed):
         (mean, sd), (sure_mean, sure_sd) = found.moments, known.moments
         return float(np.max(np.hypot(sd, mean - sure_mean) / np.maximum(sure_sd, LEAST)))
 
+    @in_float64
+    def interval_error(self, more: int = 0) -> float:
+        """Error of the parameters' 90 % intervals that the surrogate's doubt allows, in the
+        posterior's sds: the largest of all ends, see `interval_error.interval_error`.
+
+        Args:
+            more: Simulations at draws of the posterior, after which it is expected.
+        """
+        more, learned = checked_integer("more", more, 0), self.learned
+        if more:
+            drawn = self.population.resample(np.random.default_rng(0), more)
+            learned = learned.fantasize(ndtr(drawn))
+        return interval_error(self.population, self.learned.log_likelihood, learned)
+
     @property
     def surrogate(self) -> SurrogateView:
         return SurrogateView(self.prior, self.learned)
@@ -321,6 +384,21 @@ class Fit(Displayed):
         u = self.prior.to_unit(theta)
         values = log_likelihood(self._target, u.reshape(-1, u.shape[-1]))
         return self.prior.log_prob(theta) + values.reshape(u.shape[:-1])
+
+    @cached_property
+    @in_float64
+    def evidence(self) -> Evidence:
+        """Log of the probability density of what was observed, averaged over the prior.
+
+        Differences between models of the same data are logs of Bayes factors. Of the surrogate
+        "discrepancy" it is the probability of a discrepancy below the threshold; of
+        "log_likelihood", the simulator's own constant is in it. The error holds chance and what
+        the emulator does not know, but noise that is estimated from runs counts as known.
+        """
+        learned = self.learned
+        log, error = evidence_of(self.population, self._target, learned.log_second_moment)
+        error = float(np.sqrt(error**2 + learned.log_variance))
+        return Evidence(log + learned.log_constant, error)
 
     @in_float64
     def sample(  # noqa: PLR0913  each of them is a plain choice of the user's
@@ -400,6 +478,94 @@ class Fit(Displayed):
         }
         return _tree(self, made, seed, attributes)
 
+    @in_float64
+    def sobol(self, n: int = 2048, *, seed: int = 0) -> "xr.Dataset":
+        """Sobol indices of the emulated output with respect to the prior.
+
+        No simulator is run: they are as good as the emulator is, see `Fit.warnings`, over the whole
+        prior, and know nothing of the data. Those of the surrogates "discrepancy" and
+        "log_likelihood" are of the transformed discrepancy and of the log likelihood.
+
+        Args:
+            n: Points of each design, a power of two; n (d + 2) evaluations of the emulator.
+            seed: Fixes them.
+
+        Returns:
+            Over `parameter` and the output's axes: `first`, the share of the variance that a
+            parameter makes alone (Saltelli et al. 2010), and `total`, with all its interactions
+            (Jansen 1999); NaN of what does not vary. Over `parameter`: `first_of_all` and
+            `total_of_all`, the same of the whole output, weighted by variance (Lamboni et al. 2011,
+            Gamboa et al. 2014).
+
+        Raises:
+            ValueError: `n` is no power of two, or no value varies.
+        """
+        n = checked_integer("n", n, 2, MOST_DRAWS)
+        require(n.bit_count() == 1, "n", "be a power of two", n)
+        return sobol_indices(self.prior, self.learned, n, checked_integer("seed", seed, 0))
+
+    @in_float64
+    def report(self, path: str | Path, tree: "xr.DataTree | None" = None) -> Path:
+        """Write one HTML page: parameters, whether the model fits, the emulator, what to do next.
+
+        Args:
+            path: Of the page, which needs nothing from outside it.
+            tree: What `sample` of this fit has returned; None samples now.
+
+        Returns:
+            The page.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        from .fit_report import write_report
+
+        if tree is not None:
+            check_kind("tree", tree, xr.DataTree)
+        return write_report(path, self, self.sample(warn=False) if tree is None else tree)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the fit to one file, without pickle: prior, data, every simulation, and how it was
+        made. Functions of your own and the simulator are not in it.
+
+        Returns:
+            The file, a zip archive whose `fit.json` says how the fit was made.
+
+        Raises:
+            OSError: it cannot be written; nothing is left of it then.
+        """
+        return write_fit(path, self)
+
+    @classmethod
+    def load(
+        cls,
+        path: str | Path,
+        *,
+        prior: Prior | None = None,
+        surrogate: Family | None = None,
+        **options: Any,
+    ) -> Self:
+        """The fit that `save` wrote: learned again from its simulations, with the same bits.
+
+        It has no simulator: it cannot `check` or `criticise`.
+
+        Args:
+            path: Of the file.
+            prior: Where its distributions are more than their numbers, and for none other.
+            surrogate: The object, where it is of a class of your own.
+            options: Functions and objects that were options of the surrogate, such as
+                `discrepancy=...`, `summary=...` and `noise=...`.
+
+        Raises:
+            OSError: there is no such file.
+            ValueError: it is none of `save`, or one of another version of the engine; something
+                that must be given is missing, or is not what the fit was made with, by its
+                description, or by discrepancies and posterior densities at the simulations.
+        """
+        made = cls(**read_fit(path, prior, surrogate, options))
+        check_same(path, made)
+        return made
+
     def check(self, n: int = 200, **how: Any) -> Any:
         """Ranks and coverage of the pipeline that made this fit, on n data sets of known truth.
 
@@ -448,15 +614,29 @@ def _tree(fit: Fit, made: Sampled, seed: int, attributes: Mapping[str, object]) 
     prior, chains, length = fit.prior, made.chains, made.chains.u.shape[1]
     posterior = prior.from_unit(chains.u)
     rng = np.random.default_rng([seed, *b"prior"])
-    before = prior.from_unit(rng.random((length, len(prior))))
-    tree = arviz_base.from_dict(
-        {
-            "posterior": posterior,
-            "sample_stats": dict(chains.stats),
-            "prior": {name: values[None] for name, values in before.items()},
-            "observed_data": {"signal": fit.observed},
-        }
+    u_before = rng.random((length, len(prior)))
+    before = {name: values[None] for name, values in prior.from_unit(u_before).items()}
+    generators = (np.random.default_rng([seed, *kind]) for kind in (b"predictive", b"before"))
+    shapes = (chains.u.shape[:2], (1, length))
+    drawn = chains.u.reshape(-1, len(prior)), u_before
+    predicted, expected = (
+        _shaped(fit.learned.predictive(generator, u), shape)
+        for generator, u, shape in zip(generators, drawn, shapes, strict=True)
     )
+    log_prior = prior.log_probs({name: values.ravel() for name, values in posterior.items()})
+    constants = {name: np.asarray(value) for name, value in fit.learned.constants().items()}
+    groups = {
+        "posterior": posterior,
+        "sample_stats": dict(chains.stats),
+        "prior": before,
+        "log_prior": _shaped(log_prior, shapes[0]),
+        "log_likelihood": _shaped(_log_likelihoods(fit, drawn[0]), shapes[0]),
+        "posterior_predictive": predicted,
+        "prior_predictive": expected,
+        "observed_data": {"signal": np.atleast_1d(fit.observed), **fit.learned.compared},
+        "constant_data": constants,
+    }
+    tree = arviz_base.from_dict({name: held for name, held in groups.items() if held})
     tree["simulations"] = xr.DataTree(fit.simulations)
     for group in ("posterior", "prior", "simulations"):
         for name, described in prior.describe().items():
@@ -471,21 +651,10 @@ def _tree(fit: Fit, made: Sampled, seed: int, attributes: Mapping[str, object]) 
         divergences=int(np.sum(chains.stats.get("diverging", 0))),
         status=made.status,
         draws_made=made.steps,
+        log_evidence=fit.evidence.log,
+        log_evidence_error=fit.evidence.error,
         **made.checks,
     )
-    constants = {name: np.asarray(value) for name, value in fit.learned.constants().items()}
-    if constants:
-        tree["constant_data"] = arviz_base.from_dict({"constant_data": constants})["constant_data"]
-    rows = np.linspace(0, length - 1, min(length, PREDICTED_DRAWS)).round().astype(int)
-    generator = np.random.default_rng([seed, *b"predictive"])
-    predicted = fit.learned.predictive(generator, chains.u[:, rows].reshape(-1, len(prior)))
-    if predicted:
-        groups = {
-            name: np.asarray(values).reshape(-1, len(rows), *np.shape(values)[1:])
-            for name, values in predicted.items()
-        }
-        drawn = arviz_base.from_dict({"posterior_predictive": groups}, coords={"draw": rows})
-        tree["posterior_predictive"] = drawn["posterior_predictive"]
     tree["emulator_checks"] = xr.DataTree(_emulator_checks(fit))
     for group in tree.children.values():
         sampled = [name for name in SAMPLE_DIMS if name in group.dims]
@@ -494,6 +663,20 @@ def _tree(fit: Fit, made: Sampled, seed: int, attributes: Mapping[str, object]) 
             group.attrs["sample_dims"] = sampled
     tree.attrs.update(attributes, version=version("bolfi-liquids"))
     return tree
+
+
+def _shaped(groups: Mapping[str, np.ndarray], shape: tuple[int, int]) -> dict[str, np.ndarray]:
+    """Rows [n, ...] as chains and draws [*shape, ...]."""
+    return {name: np.reshape(of, (*shape, *np.shape(of)[1:])) for name, of in groups.items()}
+
+
+def _log_likelihoods(fit: Fit, u: np.ndarray) -> dict[str, np.ndarray]:
+    """Log densities of the observed values at u [n, d], and what their sum lacks."""
+    terms = fit.learned.pointwise(u)
+    total = log_likelihood(fit._target, u) + fit.learned.log_constant
+    rest = total - sum(of.reshape(len(u), -1).sum(1) for of in terms.values())
+    together = rest.std() > NO_DEPENDENCE
+    return {**terms, **({"dependence": rest} if together else {})}
 
 
 def _emulator_checks(fit: Fit) -> "xr.Dataset":

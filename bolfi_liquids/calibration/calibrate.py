@@ -30,6 +30,7 @@ from ..run.results import generations, versions
 from ..run.run import RUN_TOML, Run
 from ..run.simulations import warn_of_failures
 from ..simulators import StirSimulator, stir_simulator
+from ..wording import spoken, with_unit
 from .baseline import (
     Baseline,
     CleanSource,
@@ -219,6 +220,13 @@ def _calibrate(
             warn=False,
             progress=advance,
             noise=noise,
+        )
+        logger.info(
+            "posterior so far: %s",
+            ", ".join(
+                f"{spoken(name)} {with_unit(name, median)} (90 %: {low:.3g} to {high:.3g})"
+                for name, (low, median, high) in fit.quantiles((0.05, 0.5, 0.95)).items()
+            ),
         )
         if error is not None:
             learned = clean_residuals(  # criticise finds the same simulations

@@ -311,8 +311,13 @@ def demo(
     from ..reporting.warnings import Results
 
     with printed.complaints_among_results(), compute.opened() as opened:
-        made = run_demo(out, compute=opened, fitted=printed.print_calibration)
-    printed.print_findings(made.criticism)
+        made = run_demo(
+            out,
+            compute=opened,
+            begins=printed.print_step,
+            fitted=printed.print_calibration_and_page,
+            criticised=printed.print_findings,
+        )
     printed.print_pour_before(made.pour_before)
     printed.print_pour(made.pour)
     printed.print_warnings(Results.of(made.calibration.run))

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from ..calibration.baseline import Baseline
     from ..calibration.result import Calibration
     from ..criticism.result import Criticism
+    from ..demo import Step
     from ..hardware import Check
     from ..inputs.recording import Recording
     from ..next_stir import NextStir
@@ -54,6 +55,20 @@ def print_calibration(calibration: "Calibration") -> None:
     columns = {"mean": "mean", "sd": "sd", "5 %": "q05", "50 %": "q50", "95 %": "q95"}
     _print_table("parameter", columns | {"closest": "closest"}, rows)
     _print_prose(("fit", "effort"), {"calibration": facts})
+
+
+def print_step(step: "Step", own: float, left: float) -> None:
+    """What begins and how long it takes, and how long all that is left; on stderr, as progress."""
+    seconds, minutes = max(5 * round(own / 5), 5), max(round(left / 60), 1)
+    typer.echo(f"{step.name}: {step.text} (about {seconds} s; {minutes} min in all)", err=True)
+
+
+def print_calibration_and_page(calibration: "Calibration") -> None:
+    """A calibration, and where a page shows it already."""
+    from ..run.run import REPORT
+
+    print_calibration(calibration)
+    typer.echo(f"report so far: {calibration.path / REPORT}")
 
 
 def print_baseline(baseline: "Baseline") -> None:

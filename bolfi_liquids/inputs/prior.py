@@ -12,21 +12,13 @@ if TYPE_CHECKING:
     from numpyro.distributions import Distribution
 
     from ..inference import Prior
-
-Described = Mapping[str, Any]
-"""Family and arguments of a distribution: texts, numbers, and such a table for another one."""
+    from ..inference.distributions import Table
 
 PARAMETERS = {"viscosity": (0.0, MAX_VISCOSITY), "cohesion": (0.0, 1.0)}
 """The simulator's parameters, and where it is defined."""
 
 TAIL = 1e-3
 """Mass of a prior that may lie beyond on either side."""
-
-TRUNCATED = (
-    "LeftTruncatedDistribution",
-    "RightTruncatedDistribution",
-    "TwoSidedTruncatedDistribution",
-)
 
 
 def split_parameters[V](theta: Mapping[str, V]) -> tuple[dict[str, V], dict[str, V]]:
@@ -48,16 +40,14 @@ def default_prior() -> "Prior":
     return Prior({"viscosity": dist.LogUniform(3e-4, 20.0), "cohesion": dist.Uniform(0.0, 1.0)})
 
 
-def describe_prior(prior: "Prior") -> dict[str, Described]:
-    """Each parameter's distribution as a table of its family and arguments.
+def describe_prior(prior: "Prior") -> dict[str, "Table"]:
+    """Each parameter's distribution as a table of its family and arguments."""
+    from ..inference.distributions import to_table
 
-    Such as `{"family": "LogUniform", "high": 20.0, "low": 0.003}`, in which `family` is the name of
-    a distribution of numpyro and the rest are its arguments.
-    """
-    return {name: _described(one) for name, one in prior.distributions.items()}
+    return {name: to_table(one) for name, one in prior.distributions.items()}
 
 
-def read_prior(described: Mapping[str, Described]) -> "Prior":
+def read_prior(described: "Mapping[str, Table]") -> "Prior":
     """The prior that `describe_prior` described.
 
     Raises:
@@ -65,8 +55,9 @@ def read_prior(described: Mapping[str, Described]) -> "Prior":
         TypeError: Arguments that it does not take.
     """
     from ..inference import Prior
+    from ..inference.distributions import from_table
 
-    return Prior({name: _distribution(name, table) for name, table in described.items()})
+    return Prior({name: from_table(table) for name, table in described.items()})
 
 
 def check_prior(prior: "Prior") -> None:
@@ -100,37 +91,10 @@ def _is_kept(name: str, distribution: "Distribution") -> bool:
     """Whether a distribution is the same after it was written down and read."""
     from ..inference import Prior
 
+    alone = Prior({name: distribution})
     u = np.linspace(0.01, 0.99, 9)[:, None]
     try:
-        again = read_prior({name: _described(distribution)}).from_unit(u)[name]
+        again = read_prior(describe_prior(alone)).from_unit(u)[name]
     except (AttributeError, TypeError, ValueError):
         return False
-    return bool(np.allclose(again, Prior({name: distribution}).from_unit(u)[name], rtol=1e-5))
-
-
-def _described(distribution: "Distribution") -> Described:
-    family = type(distribution).__name__
-    names = sorted(distribution.arg_constraints)
-    table = {name: _number(getattr(distribution, name)) for name in names}
-    if family in TRUNCATED:  # by a function of numpyro, whose name is not that of a class
-        base = _described(getattr(distribution, "base_dist"))  # noqa: B009  of no common type
-        return {"family": "TruncatedDistribution", "base_dist": base, **table}
-    return {"family": family, **table}
-
-
-def _number(value: Any) -> float:
-    return float(str(value))  # of a float32 its shortest text: 0.003 stays 0.003
-
-
-def _distribution(name: str, table: Described) -> "Distribution":
-    import numpyro.distributions as dist
-
-    arguments = {
-        key: _distribution(name, value) if isinstance(value, Mapping) else value
-        for key, value in table.items()
-        if key != "family"
-    }
-    family: Any = getattr(dist, str(table.get("family")), None)
-    if family is None:
-        raise ValueError(f"the prior of {name} is {dict(table)!r}, which no distribution describes")
-    return family(**arguments)
+    return bool(np.allclose(again, alone.from_unit(u)[name], rtol=1e-5))

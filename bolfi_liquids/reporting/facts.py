@@ -121,6 +121,9 @@ def fit_facts(summary: CalibrationSummary) -> Facts:
     else:
         fit = "within error" if near else "above noise"
     return {
+        "intervals": {
+            spoken(name): values.interval(name) for name, values in summary.parameters.items()
+        },
         "bad": bad_fit(summary),
         "fit": fit,
         "misfit": not near,

@@ -20,6 +20,7 @@ JITTER = 1e-7
 SCORE_EDGE = 1e-9  # quantile beyond which normal scores end
 NO_TAIL, BOTH_TAILS, UPPER_TAIL, LOWER_TAIL = range(4)
 HALF_NORMAL_MEAN, HALF_NORMAL_SD = (2.0 / np.pi) ** 0.5, (1.0 - 2.0 / np.pi) ** 0.5
+ROUNDING = 1e-9  # of the prior variance, by which a joint covariance may fail to be positive
 MIN_VARIANCE = 1e-10  # latent variance, which rounding may make negative
 MIN_ROWS = 32  # of padded processes
 BATCH = 256  # points of one product, which fits a processor's cache
@@ -206,6 +207,16 @@ def predict_joint(gp: GP, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     at_u, at_v = _whitened(gp, _cross(gp, u)[0]), _whitened(gp, _cross(gp, v)[0])
     at, there = (coordinates(points, gp.data.tails) for points in (u, v))
     return covariance(gp.hyper, at, there) - at_u @ at_v.mT
+
+
+def draw(gp: GP, rng: np.random.Generator, u: np.ndarray, n: int) -> np.ndarray:
+    """n draws of the latent functions at different points u [m, d]: [n, k, m]."""
+    mean, _ = predict(gp, u)
+    joint = predict_joint(gp, u, u)
+    own = np.trace(joint, axis1=1, axis2=2) / len(u)
+    least = ROUNDING * (own + np.exp(2.0 * gp.hyper.log_amplitude)) + MIN_VARIANCE
+    factor = np.linalg.cholesky(joint + least[:, None, None] * np.eye(len(u)))
+    return mean + (factor @ rng.normal(size=(n, *mean.shape, 1)))[..., 0]
 
 
 def resolved(gp: GP, u: np.ndarray, runs: np.ndarray) -> np.ndarray:

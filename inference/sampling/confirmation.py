@@ -24,6 +24,7 @@ class Before(NamedTuple):
         learned: The `Surrogate` on which it rests.
         told: Simulations that were told.
         drawn: Draws of it that were asked next, theta [n, d].
+        asked: Points that had been asked when the surrogate was learned.
     """
 
     mean: np.ndarray
@@ -31,6 +32,7 @@ class Before(NamedTuple):
     learned: Any
     told: int
     drawn: np.ndarray
+    asked: int = 0
 
     def runs(self, history: "History") -> np.ndarray:
         """Rows of the runs at the draws, whatever was told among them."""

@@ -100,7 +100,6 @@ def _cross_checked(u: np.ndarray, target: Target, effective: float) -> tuple[dic
     checks = {
         "quadrature_total_variation": distance,
         "quadrature_total_variation_limit": limit,
-        "log_evidence": cells.log_evidence,
     }
     if distance <= limit:
         return checks, ""

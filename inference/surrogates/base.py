@@ -98,6 +98,10 @@ class Surrogate(Protocol):
         known = 2.0 * np.asarray(self.log_likelihood(u))
         return known if runs is None else np.repeat(known[:, None], len(runs), axis=1)
 
+    def realisations(self, rng: np.random.Generator, u: np.ndarray, n: int) -> np.ndarray:
+        """Log likelihoods [n, m] at different u [m, d] under n simulators that the runs allow."""
+        return np.repeat(np.asarray(self.log_likelihood(u))[None], n, axis=0)
+
     def log_success(self, u: np.ndarray) -> np.ndarray:
         """Log probability [n] that a run at u [n, d] succeeds."""
         return np.zeros(len(u))
@@ -122,6 +126,33 @@ class Surrogate(Protocol):
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
         """One new observation for each row of u [n, d]: name -> [n, ...]."""
         return {}
+
+    def placed(self, values: np.ndarray) -> dict[str, np.ndarray]:
+        """What holds for each number of `predict`, [n, ...], at the place of what was observed:
+        name -> [n, ...]."""
+        return {"predicted": values}
+
+    @property
+    def compared(self) -> dict[str, np.ndarray]:
+        """What was made of the observed output, to be compared, where it is not the output itself:
+        name, as of `pointwise` -> [...]."""
+        return {}
+
+    @property
+    def log_constant(self) -> float:
+        """What `log_likelihood` lacks to be the log density of what was observed."""
+        return 0.0
+
+    @property
+    def log_variance(self) -> float:
+        """Variance of the log likelihood, by what the surrogate counts as noise and is its own
+        error, beyond that of `log_second_moment`."""
+        return 0.0
+
+    def pointwise(self, u: np.ndarray) -> dict[str, np.ndarray]:
+        """Log density of each observed value, given all others, at u [n, d]: name -> [n, ...]. Here
+        what was observed is one datum."""
+        return {"observed": np.asarray(self.log_likelihood(u)) + self.log_constant}
 
 
 class Family(Protocol):

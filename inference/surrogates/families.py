@@ -3,6 +3,8 @@
 from dataclasses import fields
 from typing import Any, cast
 
+import numpy as np
+
 from ..arguments import check_called
 from .base import Family, Surrogate
 from .discrepancy import DiscrepancyFamily
@@ -39,8 +41,8 @@ def resolve(surrogate: str | Family | None, options: dict[str, Any]) -> Family:
         check_called("learn of surrogate", family.learn, "data", "key")
         return family
     if surrogate is None:
-        for_discrepancy = (_options("discrepancy") - _options("signal")) | {"discrepancy"}
-        for_signal = _options("signal") - _options("discrepancy")
+        for_discrepancy = (option_names("discrepancy") - option_names("signal")) | {"discrepancy"}
+        for_signal = option_names("signal") - option_names("discrepancy")
         given = {name for name, value in options.items() if value is not None}
         of_paper, of_signal = for_discrepancy & given, for_signal & given
         if "discrepancy" in of_paper and of_signal:
@@ -49,22 +51,40 @@ def resolve(surrogate: str | Family | None, options: dict[str, Any]) -> Family:
                 'one out, or say surrogate="signal", to which a discrepancy only ranks simulations'
             )
         surrogate = "discrepancy" if of_paper and not of_signal else "signal"
-        options = {n: v for n, v in options.items() if v is not None or n in _options(surrogate)}
+        options = {
+            n: v for n, v in options.items() if v is not None or n in option_names(surrogate)
+        }
     if surrogate not in tuple(FAMILIES):
         raise ValueError(
             f"surrogate must be one of {tuple(FAMILIES)}, an object of a class whose base is "
             f"`Family`, or None, got {surrogate!r:.100}"
         )
-    unknown = options.keys() - _options(surrogate)
+    unknown = options.keys() - option_names(surrogate)
     if unknown:
         raise ValueError(
             f"there is no argument {', '.join(sorted(unknown))}; the surrogate {surrogate!r} has "
-            f"the options {tuple(sorted(_options(surrogate)))}"
+            f"the options {tuple(sorted(option_names(surrogate)))}"
         )
     return FAMILIES[str(surrogate)](**options)
 
 
-def _options(name: Any) -> set[str]:
+def plain_options(family: Family) -> dict[str, Any] | None:
+    """Those options of a family that are numbers, texts, arrays or None; None of a family that is
+    not the engine's own."""
+    if type(family) not in FAMILIES.values():
+        return None
+    return {name: value for name, value in vars(family).items() if _is_plain(value)}
+
+
+def _is_plain(value: Any) -> bool:
+    listed = isinstance(value, list | tuple) and not hasattr(value, "_fields")
+    if listed or hasattr(value, "__array__"):
+        return np.asarray(value).dtype.kind in "biuf"
+    return value is None or isinstance(value, bool | int | float | str)
+
+
+def option_names(name: Any) -> set[str]:
+    """Names of the options that the family of this name has."""
     return {field.name for field in fields(FAMILIES[name])}
 
 

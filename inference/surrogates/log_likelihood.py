@@ -96,6 +96,10 @@ class LevelLikelihood(NamedTuple):
     def _values(self, latent: Any) -> Any:
         return namespace(latent).minimum(self.scale.values(latent), self.scale.top + self.rise)
 
+    def known(self, u: np.ndarray, latent: np.ndarray) -> np.ndarray:
+        """The log likelihood [n], were the targets at u [n, d] latent [1, n]."""
+        return self._values(latent[0]) + log_success(self.success, u)
+
     def second_moment(self, u: np.ndarray, spread: np.ndarray | None) -> np.ndarray:
         """log (L^2 + R^2), R the interquartile range of the likelihood: [n] or [n, ...].
 

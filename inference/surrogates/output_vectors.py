@@ -37,6 +37,11 @@ class Output:
     series: bool
 
     @property
+    def complete(self) -> bool:
+        """Whether the values are the whole output, as it is."""
+        return self.summary is None and len(self.starts) == int(np.prod(self.shape))
+
+    @property
     def long(self) -> bool:
         """Whether it is a series so long that its residual tells the size of the noise."""
         return self.series and len(np.unique(self.layout.sample)) >= MIN_LONG

@@ -19,6 +19,7 @@ from ..gp.process import (
     condition,
     coordinates,
     covariance,
+    draw,
     fantasize,
     leave_one_out_errors,
     predict,
@@ -41,7 +42,8 @@ class OfProcesses(Surrogate):
         log_likelihood: A named tuple of arrays that is called with u [n, d]. Among its fields are
             `success` (see `learn_success`) and `doubt`, the part of the latent variance that
             counts. Its method `second_moment(u, spread)` is log E[L(u)^2] [n] over latent values
-            that vary with their variance, or [n, ...] with `spread` [n, ..., k].
+            that vary with their variance, or [n, ...] with `spread` [n, ..., k]; `known(u, latent)`
+            is the log likelihood [n], were the latent values [k, n].
     """
 
     gp: GP
@@ -61,6 +63,10 @@ class OfProcesses(Surrogate):
     def log_second_moment(self, u: np.ndarray, runs: np.ndarray | None = None) -> np.ndarray:
         spread = None if runs is None else resolved(self.gp, u, runs)
         return self.log_likelihood.second_moment(u, spread)
+
+    def realisations(self, rng: np.random.Generator, u: np.ndarray, n: int) -> np.ndarray:
+        state = self.log_likelihood
+        return np.stack([state.known(u, latent) for latent in draw(state.gp, rng, u, n)])
 
     def log_success(self, u: np.ndarray) -> np.ndarray:
         return log_success(self.log_likelihood.success, u)

@@ -35,6 +35,7 @@ from .noise.by_mean import ByMean, OutputScale, Plain, SdOfMean, law_of
 from .noise.given import Covariance, GivenNoise, check_noise, given_noise
 from .noise.stretched import stretched
 from .output_vectors import Output, Summary, describe, infinities, summarise
+from .pointwise import covariances, log_conditionals, weighed
 from .processes import OfProcesses, learn_success
 from .signal_likelihood import SignalLikelihood, likelihood_of, node_log_densities
 from .squared_difference import MIN_FREEDOM, evaluate, failed_on, sum_of_squares
@@ -66,6 +67,7 @@ class SignalSurrogate(OfProcesses):
             what it does not know counts as noise that explains anything.
         success: Where runs succeed, see `processes.learn_success`.
         scale: Leads from the output's values to the emulator's features.
+        lost: What the likelihood lacks to be the log density of the standardised values.
     """
 
     emulator: Emulator
@@ -78,6 +80,7 @@ class SignalSurrogate(OfProcesses):
     box: tuple[np.ndarray, np.ndarray] | None = None
     success: GP | None = None
     scale: OutputScale = Plain(np.zeros(0), None)
+    lost: float = 0.0
 
     @property
     def gp(self) -> GP:  # pyright: ignore  nobody sets it
@@ -259,7 +262,57 @@ class SignalSurrogate(OfProcesses):
         nodes = Nodes(*(part[which] for part in self.nodes))
         noise = correlated(rng.normal(size=values.shape), self.output.layout, nodes)
         values = self.scale.back(values + self.emulator.basis.scale * noise)
-        return {"signal": self.output.restore(self.scale.observe(rng, values))}
+        return self.placed(self.scale.observe(rng, values))
+
+    def placed(self, values: np.ndarray) -> dict[str, np.ndarray]:
+        """Values [n, m] at their places in the "signal", NaN where nothing was observed; and as
+        "values", where they are those of a summary, or samples are missing or averaged."""
+        whole = {} if self.output.summary else {"signal": self.output.restore(values)}
+        return whole if self.output.complete else {**whole, "values": values}
+
+    @property
+    def compared(self) -> dict[str, np.ndarray]:
+        return {} if self.output.complete else {"values": self.scale.observed}
+
+    @cached_property
+    def _log_slopes(self) -> np.ndarray:
+        """Log of what takes densities of the standardised values to those of the values [m]."""
+        levels = self.scale.log_levels(self.best_features, (self.observed, self.known))
+        return levels - np.log(self.emulator.basis.scale)
+
+    @property
+    def log_constant(self) -> float:
+        return 0.0 if self.emulator.equal else self.lost + float(self._log_slopes.sum())
+
+    @property
+    def log_variance(self) -> float:
+        """Of what components leave, as far as no repeated run bears out that it is noise: to first
+        order in that, at the best parameters."""
+        emulator, share = self.emulator, 1.0 - self.emulator.borne_out
+        if emulator.equal or not share:
+            return 0.0
+        basis, g = emulator.basis, int(self.node_weights.argmax())
+        node = Nodes(*(part[g : g + 1] for part in self.nodes))
+        (covariance,) = covariances(*_noise(emulator, self.known), self.output.layout, node)
+        missed = (self.observed - self.best_features) / basis.scale
+        slope = np.linalg.solve(covariance, missed)
+        of_scores = slope @ basis.vectors
+        left = np.sum((slope @ emulator.remainder.factors) ** 2)
+        left = left + emulator.remainder.white * slope @ slope
+        return float(share * (left + of_scores @ emulator.noise @ of_scores))
+
+    def pointwise(self, u: np.ndarray) -> dict[str, np.ndarray]:
+        """See `pointwise.log_conditionals`."""
+        terms = np.zeros((len(u), len(self.observed)))
+        if not self.emulator.equal:
+            basis, layout = self.emulator.basis, self.output.layout
+            vectors, target = basis.vectors[:, : basis.used], basis.standardise(self.observed)
+            every = covariances(*_noise(self.emulator, self.known), layout, self.nodes)
+            nodes = [weighed(one, vectors, target) for one in every]
+            noise = self.emulator.noise[: basis.used, : basis.used]
+            terms = log_conditionals(self.log_likelihood, nodes, noise, u) + self._log_slopes
+        complete = self.output.complete
+        return {"signal": self.output.restore(terms)} if complete else {"values": terms}
 
 
 def observe(
@@ -282,12 +335,8 @@ def observe(
         previous: Its nodes are kept.
     """
     basis, remainder = emulator.basis, emulator.remainder
-    target = basis.standardise(observed)
-    vectors, factors = basis.vectors, remainder.factors
-    white = np.full(len(target), remainder.white)
-    if given is not None:
-        white = white + given.white / basis.scale**2
-        factors = np.column_stack([factors, given.factors / basis.scale[:, None]])
+    target, vectors = basis.standardise(observed), basis.vectors
+    factors, white = _noise(emulator, given)
     kept = None if previous is None else (previous.nodes, previous.log_prior)
     nodes, log_prior = kept or _nodes(emulator, output, observed, given, misfit)
     if emulator.equal:  # nothing to compare
@@ -298,6 +347,8 @@ def observe(
     other = np.sum(white - remainder.white) + np.sum(factors[:, remainder.factors.shape[1] :] ** 2)
     other = other + len(target) * nodes.sigma**2
     log_weight = reduced.log_weight + log_prior
+    gone = 0.5 * (len(target) - used) * np.log(2.0 * np.pi)
+    lost = float(log_weight.max() - np.logaddexp.reduce(log_prior) - gone)
     reduced = reduced._replace(
         covariance=reduced.covariance + emulator.noise[:used, :used],
         log_weight=log_weight - log_weight.max(),
@@ -307,7 +358,19 @@ def observe(
         kept = _keep(emulator, reduced, nodes)
         reduced = Reduced(*(part[kept] for part in reduced))
         nodes, log_prior = Nodes(*(part[kept] for part in nodes)), log_prior[kept]
-    return SignalSurrogate(emulator, output, observed, given, nodes, log_prior, reduced)
+    found = SignalSurrogate(emulator, output, observed, given, nodes, log_prior, reduced)
+    return replace(found, lost=lost)
+
+
+def _noise(emulator: Emulator, given: GivenNoise | None) -> tuple[np.ndarray, np.ndarray]:
+    """Factors [m, q] and white part [m] of what is known of the noise, standardised."""
+    remainder, scale = emulator.remainder, emulator.basis.scale
+    factors, white = remainder.factors, np.full(len(scale), remainder.white)
+    if given is None:
+        return factors, white
+    return np.column_stack(
+        [factors, given.factors / scale[:, None]]
+    ), white + given.white / scale**2
 
 
 def _nodes(

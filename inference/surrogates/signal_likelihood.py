@@ -53,6 +53,12 @@ class SignalLikelihood(NamedTuple):
             covariance=covariance,
         )
 
+    def only(self, kept: list[int]) -> "SignalLikelihood":
+        """The likelihood of some nodes."""
+        names = ["estimate", "covariance", "log_weight"]
+        names += [] if self.size is None else ["share", "unexplained"]
+        return self._replace(**{name: getattr(self, name)[kept] for name in names})
+
     def __call__(self, u: Any) -> Any:
         """log P(success) sum_g w_g N(estimate_g; mu(u), covariance_g + V(u)) [n], V the emulator's
         variance.
@@ -62,6 +68,11 @@ class SignalLikelihood(NamedTuple):
         """
         densities = log_sum_exp(node_log_densities(self, u))
         return densities + log_success(self.success, u) - _wall(self, u)
+
+    def known(self, u: np.ndarray, latent: np.ndarray) -> np.ndarray:
+        """The log likelihood [n], were the scores at u [n, d] latent [k, n]."""
+        terms = _given_scores(self, u, latent.T * self.used, np.zeros(latent.T.shape))
+        return log_sum_exp(terms) + log_success(self.success, u) - _wall(self, u)
 
     def second_moment(self, u: np.ndarray, spread: np.ndarray | None) -> np.ndarray:
         """log E[L(u)^2], the expectation over means that vary with variance `spread` [n, ..., k].
@@ -79,7 +90,7 @@ class SignalLikelihood(NamedTuple):
         left = (self.estimate[loudest] - mean).reshape(len(u), *ones, k)
         covariance = self.covariance[loudest]
         if self.size is not None:
-            factor = _noise_factor(self, self.size, u)[np.arange(len(u)), loudest]
+            factor = noise_factor(self, self.size, u)[np.arange(len(u)), loudest]
             covariance = factor[:, None, None] * covariance
         covariance = covariance.reshape(len(u), *ones, k, k)
         total = total.reshape(left.shape)
@@ -115,10 +126,14 @@ def likelihood_of(
 
 def node_log_densities(state: SignalLikelihood, u: Any) -> Any:
     """The terms [n, g] of the likelihood's sum."""
-    mean, variance = scores(state, u)
+    return _given_scores(state, u, *scores(state, u))
+
+
+def _given_scores(state: SignalLikelihood, u: Any, mean: Any, variance: Any) -> Any:
+    """The terms [n, g] at scores of means and variances [n, k]."""
     of_noise, log_weight = state.covariance, state.log_weight
     if state.size is not None:
-        factor = _noise_factor(state, state.size, u)
+        factor = noise_factor(state, state.size, u)
         of_noise = factor[..., None, None] * of_noise
         log_weight = log_weight - 0.5 * (
             state.freedom * namespace(u).log(factor) + state.unexplained * (1.0 / factor - 1.0)
@@ -129,7 +144,7 @@ def node_log_densities(state: SignalLikelihood, u: Any) -> Any:
     return log_weight - 0.5 * (constant + log_det + square)
 
 
-def _noise_factor(state: SignalLikelihood, size: Size, u: Any) -> Any:
+def noise_factor(state: SignalLikelihood, size: Size, u: Any) -> Any:
     """The variance of all noise at u over that at size 1 of the run-to-run noise, [n, g].
 
     Exact where a node has no other noise, or next to no run-to-run noise; between the two, all of

@@ -109,6 +109,11 @@ class ThresholdLikelihood(NamedTuple):
         z, _, _ = self._standardised(u)
         return log_ndtr(z[:, 0]) + log_success(self.success, u)
 
+    def known(self, u: np.ndarray, latent: np.ndarray) -> np.ndarray:
+        """The log likelihood [n], were the mean discrepancies at u [n, d] latent [1, n]."""
+        sd = np.hypot(np.exp(self.gp.hyper.log_noise), self.width)
+        return log_ndtr((self.threshold - latent[0]) / sd) + log_success(self.success, u)
+
     def second_moment(self, u: np.ndarray, spread: np.ndarray | None) -> np.ndarray:
         """log E[L(u)^2], over a latent mean that varies with variance `spread` [n, ..., k].
 

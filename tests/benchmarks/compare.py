@@ -25,6 +25,9 @@ from tasks import TASKS, make_reference
 
 def main() -> None:
     chosen = arguments()
+    if chosen.page:
+        chosen.page.write_text(report(current(chosen)), encoding="utf-8")
+        return
     missing = [name for name in chosen.engines if not ENGINES[name].python.exists()]
     if missing:
         sys.exit(f"no environment for {', '.join(missing)}: run `make peers`, or name --engines")
@@ -41,9 +44,9 @@ def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     add = parser.add_argument
     add("--tasks", nargs="+", choices=TASKS, default=list(TASKS))
-    add("--engines", nargs="+", choices=ENGINES, default=[*OURS, "elfi"])
-    add("--budgets", nargs="+", type=int, default=[20, 50, 100, 200])
-    add("--seeds", nargs="+", type=int, default=[0, 1, 2, 3, 4])
+    add("--engines", nargs="+", choices=ENGINES, default=[e for e in ENGINES if e != "npe_pfn"])
+    add("--budgets", nargs="+", type=int, default=[10, 20, 40, 60, 100, 200])
+    add("--seeds", nargs="+", type=int, default=list(range(20)))
     add("--data", default="each", help="seed of the data, or `each`: every run's own seed")
     add(
         "--timed-seeds",
@@ -53,6 +56,7 @@ def arguments() -> argparse.Namespace:
     )
     add("--cores", nargs="+", type=int, default=[0], help="processors that work at once")
     add("--out", type=Path, default=ROOT / "runs" / "compare")
+    add("--page", type=Path, help="run nothing; write the report of what there is to this file")
     chosen = parser.parse_args()
     if chosen.data != "each" and not chosen.data.isdigit():
         parser.error(f"--data must be a seed or `each`, got {chosen.data!r}")
@@ -73,7 +77,7 @@ def plan(chosen: argparse.Namespace) -> list[Job]:
         for i, seed in enumerate(chosen.seeds):
             data, timed = data_seed(chosen, seed), i < chosen.timed_seeds
             prepare(chosen.out, task, data)
-            for engine in chosen.engines:
+            for engine in filter(lambda name: ENGINES[name].takes(TASKS[task]), chosen.engines):
                 for kind, budgets in processes(chosen.budgets, engine in OURS and timed):
                     left = tuple(n for n in budgets if (engine, kind, task, seed, n) not in done)
                     job = Job(

@@ -7,6 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from tasks import Task
+
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 SHARED = (HERE / "tasks", HERE / "peers" / "job.py")
@@ -20,29 +22,46 @@ ONE_THREAD = {
 
 
 class Engine(NamedTuple):
-    """Who runs it and as which module.
+    """Who runs it, as which module and on which tasks.
 
     Attributes:
         python: Interpreter of its environment.
         module: What that runs.
         sources: Files and directories that decide its results, besides `SHARED`.
+        outputs: Fewest outputs with noise of a known covariance that it needs; 0 takes any task.
     """
 
     python: Path
     module: str
     sources: tuple[Path, ...]
+    outputs: int = 0
+
+    def takes(self, task: Task) -> bool:
+        return self.outputs <= (0 if task.noise is None else len(task.noise))
 
 
 def _ours() -> Engine:
     return Engine(Path(sys.executable), "peers.run_ours", (ROOT / "inference",))
 
 
-def _peer(name: str) -> Engine:
-    python = ROOT / ".venv-peers" / name / "bin" / "python"
-    return Engine(python, f"peers.run_{name}", (HERE / "peers" / f"{name}.txt",))
+def _peer(environment: str, module: str, outputs: int = 0) -> Engine:
+    python = ROOT / ".venv-peers" / environment / "bin" / "python"
+    pins = HERE / "peers" / f"{environment}.txt"
+    return Engine(python, f"peers.{module}", (pins,), outputs)
 
 
-ENGINES = {"discrepancy": _ours(), "signal": _ours(), "elfi": _peer("elfi"), "sbi": _peer("sbi")}
+ENGINES = {
+    "signal": _ours(),
+    "discrepancy": _ours(),
+    "elfi": _peer("elfi", "run_elfi"),
+    "npe": _peer("sbi", "run_sbi"),
+    "nle": _peer("sbi", "run_sbi"),
+    "npe_pfn": _peer("sbi", "run_sbi"),
+    # a run tells the likelihood only where the noise is known
+    "vbmc": _peer("pyvbmc", "run_vbmc", outputs=1),
+    "vbmc_noisy": _peer("pyvbmc", "run_vbmc", outputs=1),
+    "surmise": _peer("surmise", "run_surmise", outputs=5),  # it refuses fewer
+}
 OURS = tuple(name for name, engine in ENGINES.items() if engine.module == "peers.run_ours")
 
 

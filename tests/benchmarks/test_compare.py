@@ -5,17 +5,26 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
-from report import report
+from engines import ENGINES
+from report import holm, report
+from tasks import TASKS
 
 HERE = Path(__file__).parent
 FOREIGN = [*(HERE / "tasks").glob("*.py"), HERE / "peers/job.py"]
-PEERS = {"elfi": {"elfi"}, "sbi": {"sbi", "torch"}}
+PEERS = {
+    "elfi": {"elfi"},
+    "sbi": {"sbi", "torch", "tabpfn"},
+    "vbmc": {"pyvbmc"},
+    "surmise": {"surmise", "scipy"},
+}
 
 
 def imported(tree):
     """Packages that a module imports, those beside it left out."""
-    names = {"collections", "contextlib", "dataclasses", "io", "json", "os"}
+    names = {"collections", "contextlib", "dataclasses", "functools", "importlib"}
+    names |= {"io", "json", "os"}
     names |= {"pathlib", "sys", "time", "typing", "__future__", "tasks"}
     found = set()
     for node in ast.walk(tree):
@@ -36,28 +45,66 @@ def test_what_runs_beside_peers_needs_only_old_python_and_numpy():
 
 def row(engine, seed, variation, **values):
     common = {"kind": "posterior", "task": "gauss2", "n": 20, "version": "1", "import_s": 1.0}
-    measured = {"total_variation": variation, "mean_error": 0.1, "sd_ratio": 1.0, "engine_s": 2.0}
-    return {**common, **measured, "engine": engine, "seed": seed, **values}
+    scored = {"total_variation": variation, "mean_error": 0.1, "sd_ratio": 1.0, "coverage": 0.9}
+    measured = {"engine_s": 2.0, "simulations": 20}
+    return {**common, **scored, **measured, "engine": engine, "seed": seed, **values}
 
 
-def test_the_table_holds_medians_over_seeds_and_their_ratio_to_elfi():
-    rows = [row("elfi", seed, variation) for seed, variation in enumerate([0.2, 0.8, 0.9])]
-    rows += [row("signal", seed, variation) for seed, variation in enumerate([0.4, 0.1, 0.9])]
-    rows += [row("signal", 3, 0.4, engine_s=1.0, fresh=True, first_engine_s=7.25)]
-    lines = [line.split() for line in report(rows).splitlines() if line.startswith("gauss2")]
-    assert lines[0][:6] == ["gauss2", "20", "elfi", "3", "0.80", "1.00"]
-    assert lines[1][:6] == ["gauss2", "20", "signal", "4", "0.40", "0.50"]
-    assert "7.25" in lines[1]
+def rows_of(engine, variations):
+    return [row(engine, seed, variation) for seed, variation in enumerate(variations)]
+
+
+def lines(text, *start):
+    """Rows of the report's tables that begin with these cells, the cells after them."""
+    found = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines()]
+    return [one[len(start) :] for one in found if tuple(one[: len(start)]) == start]
+
+
+def test_the_table_holds_medians_over_seeds_with_smaller_ones_in_bold():
+    rows = rows_of("signal", [0.4, 0.1, 0.9]) + rows_of("elfi", [0.2, 0.8, 0.3])
+    assert lines(report(rows), "gauss2", "20") == [
+        ["0.40", "**0.30**"],
+        ["signal", "3", "0.40", "0.10", "1.00", "0.90", "2.0"],
+        ["elfi", "3", "0.30", "0.10", "1.00", "0.90", "2.0"],
+    ]
     assert report([]) == "no results yet"
 
 
-def test_what_failed_is_named_and_counts_in_no_median():
+def test_a_difference_is_marked_only_where_enough_seeds_agree_on_it():
+    few, many = np.arange(5) / 100.0, np.arange(20) / 100.0
+    for variations, p_is_small in ((few, False), (many, True)):
+        rows = rows_of("signal", variations) + rows_of("npe", variations + 0.3)
+        rows += rows_of("nle", variations[::-1] - 0.001)
+        text = report(rows)
+        assert lines(text, "npe") == [["1", "1", str(int(p_is_small)), "0", "0"]]
+        assert lines(text, "nle")[0][-1] == "0"
+        assert lines(text, "gauss2", "20")[0][1].endswith("*") == p_is_small
+
+
+def test_holm_s_correction():
+    np.testing.assert_allclose(holm([0.01, 0.04, 0.03, 0.005]), [0.03, 0.06, 0.06, 0.02])
+
+
+def test_what_failed_is_named_and_is_as_far_off_as_can_be():
     failed = row("elfi", 1, 0.0, error="log densities must be finite")
-    del failed["total_variation"]
-    text = report([row("elfi", 0, 0.5), failed])
-    assert "elfi has no posterior on gauss2 at N = 20, seed 1" in text
-    line = next(line.split() for line in text.splitlines() if line.startswith("gauss2"))
-    assert line[3:5] == ["1", "0.50"]
+    for name in ("total_variation", "mean_error"):
+        del failed[name]
+    text = report([*rows_of("signal", [0.6, 0.6]), row("elfi", 0, 0.5), failed])
+    assert "has no posterior on gauss2 at N = 20, seed 1: log densities" in text
+    assert lines(text, "gauss2", "20", "elfi")[0][:3] == ["2", "0.75", "0.10"]
+
+
+def test_a_run_of_more_simulations_than_asked_is_not_compared():
+    text = report([row("signal", 0, 0.5), row("vbmc", 0, 0.1, simulations=25)])
+    assert "0.10" not in lines(text, "gauss2", "20")[0]
+    assert "`vbmc` is left out on gauss2 at N = 20: it made 25 simulations" in text
+
+
+def test_engines_take_tasks_that_they_can_do():
+    taken = {e: {t for t in TASKS if ENGINES[e].takes(TASKS[t])} for e in ENGINES}
+    assert taken["signal"] == taken["elfi"] == set(TASKS)
+    assert taken["vbmc"] - taken["surmise"] == {"ball_drop"}  # three numbers
+    assert "gauss2" not in taken["vbmc"]
 
 
 @pytest.mark.minutes  # the benchmark's own command, no part of the package
@@ -66,6 +113,6 @@ def test_a_comparison_ends_in_a_table_and_is_not_made_twice(tmp_path):
     command = [sys.executable, str(HERE / "compare.py"), *chosen.split(), "--out", str(tmp_path)]
     runs = [subprocess.run(command, capture_output=True, text=True, check=True) for _ in range(2)]
     assert runs[0].stdout.startswith("2 processes") and runs[1].stdout.startswith("0 processes")
-    table = [[line for line in run.stdout.splitlines() if "gauss2  " in line] for run in runs]
-    assert len(table[1]) == 1 and table[0][-1:] == table[1]
+    table = [lines(run.stdout, "gauss2", "12") for run in runs]
+    assert len(table[1]) == 2 and table[0] == table[1]
     assert "one ask and tell" in runs[1].stdout

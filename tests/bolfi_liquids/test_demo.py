@@ -7,7 +7,7 @@ import pytest
 import tomli_w
 
 from bolfi_liquids.calibration.calibrate import run_record
-from bolfi_liquids.demo import RECORDING, run_demo
+from bolfi_liquids.demo import RECORDING, STEPS, expected, run_demo
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.open import open_recording
 from bolfi_liquids.inputs.prior import default_prior
@@ -39,6 +39,14 @@ def test_another_run_is_left_alone(tmp_path, name):
         run_demo(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == [RUN_TOML]
     assert (tmp_path / RUN_TOML).read_text() == held
+
+
+def test_the_time_left_follows_how_slow_the_computer_was():
+    first, second, *_ = usual = [step.seconds for step in STEPS]
+    assert expected(STEPS[0], 0.0) == (first, sum(usual))
+    assert expected(STEPS[1], 3.0 * first) == (3.0 * second, 3.0 * sum(usual[1:]))
+    # the run held the calibration: this says nothing of the computer
+    assert expected(STEPS[1], 0.1) == (second, sum(usual[1:]))
 
 
 def test_its_own_run_is_gone_on_with(tmp_path, monkeypatch):

@@ -173,6 +173,35 @@ def check_sentences(of):
         assert isinstance(said, list) and all(isinstance(one, str) and one for one in said)
 
 
+def check_placed(of):
+    """Each value once; NaN where nothing was observed."""
+    mean = of.predict(POINTS)[0]
+    for values in of.placed(mean).values():
+        assert len(values) == 3
+        np.testing.assert_array_equal(values[np.isfinite(values)], mean.ravel())
+
+
+def check_pointwise(of):
+    """Of a mapping's names, those that were compared have the shape of what was compared."""
+    assert of.pointwise(POINTS)
+    for name, values in of.pointwise(POINTS).items():
+        assert len(values) == 3 and finite(values)
+        assert name not in of.compared or values.shape[1:] == of.compared[name].shape
+
+
+check_compared = check_pointwise
+
+
+def check_log_constant(of):
+    assert finite(of.log_constant) and of.log_variance >= 0.0
+
+
+def check_realisations(of):
+    drawn = of.realisations(np.random.default_rng(0), POINTS, 5)
+    assert drawn.shape == (5, len(POINTS)) and not np.isnan(drawn).any()
+
+
+check_log_variance = check_log_constant
 check_described = check_unreached = check_warnings = check_sentences
 
 

@@ -152,8 +152,8 @@ def shown(fit):
 
 
 def test_a_fit_says_what_it_is_in_a_few_lines(line_fit, prior, observed, simulate):
-    rows = ["parameters", "simulations", "discrepancy", "surrogate", "status", "warnings"]
-    assert list(shown(line_fit)) == rows
+    rows = ["parameters", "interval ends", "simulations", "discrepancy", "surrogate", "status"]
+    assert list(shown(line_fit)) == [*rows, "warnings"]
     assert shown(line_fit)["simulations"].startswith("20,")
     assert "discrepancy" in shown(line_fit)["surrogate"]
     assert all(name in shown(line_fit)["parameters"] for name in prior.names)

@@ -38,12 +38,17 @@ def trials():
     return theta, loss
 
 
+def exact(prior, log_likelihood):
+    """Parameters on a grid of the prior, and their weights in the posterior."""
+    u = np.stack(np.meshgrid(*[(np.arange(400) + 0.5) / 400] * 2), -1).reshape(-1, 2)
+    theta = prior.from_unit(u)
+    values = log_likelihood(theta)
+    return theta, np.exp(values - values.max()) / np.exp(values - values.max()).sum()
+
+
 def moments(fit, log_likelihood):
     """Shift of the means in exact sds, and ratio of the sds, beside a grid of the prior."""
-    u = np.stack(np.meshgrid(*[(np.arange(400) + 0.5) / 400] * 2), -1).reshape(-1, 2)
-    theta = fit.prior.from_unit(u)
-    values = log_likelihood(theta)
-    weights = np.exp(values - values.max()) / np.exp(values - values.max()).sum()
+    theta, weights = exact(fit.prior, log_likelihood)
     drawn = fit.sample("quadrature", warn=False)["posterior"]
     found = []
     for name, column in theta.items():
@@ -81,6 +86,17 @@ def test_a_table_of_losses_with_known_and_unknown_noise():
     off, _ = moments(inference.fit_losses(theta, loss, DECAY, noise=SD), lambda t: -losses(t))
     ratios = moments(known, lambda t: -0.5 * losses(t) / (3.0 * SD) ** 2)[1]
     assert off < 1.0 and (ratios < 0.5).all()  # a wrong noise would be seen
+
+
+def test_quantiles_without_sampling():
+    fit = inference.fit_losses(*trials(), DECAY, noise=SD)
+    theta, weights = exact(DECAY, lambda t: -0.5 * losses(t) / SD**2)
+    levels = (0.05, 0.5, 0.95)
+    for name, found in fit.quantiles(levels).items():
+        columns, of = np.unique(theta[name], return_inverse=True)
+        mass = np.bincount(of, weights)
+        below = np.interp(found, columns, np.cumsum(mass) - 0.5 * mass)  # a cell's middle
+        assert below == pytest.approx(levels, abs=0.02)
 
 
 def narrow(theta):

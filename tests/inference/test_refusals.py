@@ -7,8 +7,10 @@ a new argument that takes anything. Nothing is simulated before an argument is r
 import inspect
 import multiprocessing
 import re
+import tempfile
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from functools import partial
+from pathlib import Path
 
 import jax
 import matplotlib
@@ -93,6 +95,12 @@ def cases():
         "Bolfi.confirm": (engine.confirm, {"fit": engine.fit(warn=False)}),
         "Fit.log_prob": (fit.log_prob, {"theta": THETA}),
         "Fit.sample": (fit.sample, {"sampler": "quadrature", "draws": 8}),
+        "Fit.report": (fit.report, {"path": Path(tempfile.mkdtemp()) / "fit.html"}),
+        "Fit.save": (fit.save, {"path": Path(tempfile.mkdtemp()) / "fit"}),
+        "Fit.sobol": (fit.sobol, {"n": 64}),
+        "Fit.quantiles": (fit.quantiles, {"levels": (0.1, 0.9)}),
+        "Fit.interval_error": (fit.interval_error, {"more": 3}),
+        "Until": (inference.Until, {"tolerance": 0.1, "most": 30, "error": len}),
         "Prior": (inference.Prior, {"distributions": {"a": dist.Uniform(0.0, 1.0)}}),
         "Prior.describe": (prior.describe, {}),
         "Prior.to_array": (prior.to_array, {"theta": THETA}),
@@ -101,6 +109,7 @@ def cases():
         "Prior.from_unit": (prior.from_unit, {"u": np.zeros((3, 1))}),
         "Prior.contains": (prior.contains, {"theta": THETA}),
         "Prior.log_prob": (prior.log_prob, {"theta": THETA}),
+        "Prior.log_probs": (prior.log_probs, {"theta": THETA}),
         "Prior.sample": (prior.sample, {"key": jax.random.key(0), "n": 2}),
         "emulate": (
             inference.emulate,
@@ -238,6 +247,10 @@ VALUES = {
             dist.VonMises(0.0, 1.0),
         )
     ],
+    "Fit.quantiles": [{"levels": (0.1, 1.1)}, {"levels": np.nan}],
+    "Fit.interval_error": [{"more": -1}],
+    "Until": [{"tolerance": 0.0}, {"tolerance": np.inf}, {"most": 2}],
+    "Fit.sobol": [{"n": 1000}, {"n": 1}, {"n": 64.5}, {"seed": -1}],
     "Prior.to_array": [
         {"theta": theta}
         for theta in (0.5, {}, {"b": 1.0}, {"a": "thick"}, {"a": np.zeros((2, 2))}, {"a": np.nan})

@@ -14,6 +14,9 @@ pytestmark = pytest.mark.slow  # one fit with NUTS compiles for ten seconds
 GROUPS = {
     "posterior",
     "prior",
+    "log_prior",
+    "log_likelihood",
+    "prior_predictive",
     "sample_stats",
     "observed_data",
     "posterior_predictive",
@@ -65,7 +68,7 @@ def test_draws_are_in_their_own_units_with_prior_and_unit(tree, fit):
     assert abs(logs.mean() - np.log(0.1 * 2.0) / 2.0) < 4.5 * spread
 
 
-def test_measures_are_kept_where_they_belong(tree):
+def test_measures_are_kept_where_they_belong(tree, fit):
     posterior = tree["posterior"]
     slope = posterior["slope"].to_numpy()
     attrs = posterior["slope"].attrs
@@ -78,6 +81,7 @@ def test_measures_are_kept_where_they_belong(tree):
     assert posterior.attrs["divergences"] == int(tree["sample_stats"].diverging.sum())
     assert posterior.attrs["status"] == "converged"
     assert posterior.attrs["draws_made"] % 100 == 0
+    assert (posterior.attrs["log_evidence"], posterior.attrs["log_evidence_error"]) == fit.evidence
     total = posterior.attrs["quadrature_total_variation"]
     assert 0.0 < total < posterior.attrs["quadrature_total_variation_limit"]
 
@@ -91,16 +95,15 @@ def test_the_surrogate_speaks_for_itself(tree, fit):
     assert checks["loo_z"].dims[0] == "simulation"
     assert checks.attrs["warnings"] == "\n".join(fit.warnings)
     predicted = tree["posterior_predictive"]["discrepancy"]
-    assert predicted.shape == (4, 50)
-    # its coordinate says which posterior draw each belongs to
-    at = tree["posterior"].dataset.sel(draw=predicted["draw"])
+    at = tree["posterior"].dataset
+    assert predicted.sizes == at.sizes
     mean, sd = fit.surrogate.predict(
         {name: at[name].to_numpy().ravel() for name in fit.prior.names}
     )
     transform = learned.transform
     z = (transform(predicted.to_numpy().ravel()) - mean) / sd
     assert abs(z.mean()) < 4.5 / np.sqrt(z.size)
-    assert 0.75 < z.std() < 1.25  # 200 draws: six standard errors
+    assert 0.8 < z.std() < 1.2  # 400 draws: six standard errors
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import ClassVar, cast
 
 import numpy as np
-from scipy.special import xlogy
+from scipy.special import gammaln, xlogy
 
 from ...arguments import checked_array, checked_number
 from ..output_vectors import Output
@@ -25,7 +25,8 @@ SdOfMean = Callable[[np.ndarray], np.ndarray]
 
 
 class Poisson:
-    """Counts; each value is the average of `counts` [m] samples."""
+    """Counts; each value is the average of `counts` [m] samples. `log_density` lacks
+    `log_constant`."""
 
     def check(self, values: np.ndarray) -> None:
         least = values.min()
@@ -39,13 +40,17 @@ class Poisson:
         mean = np.maximum(mean, 0.0)
         return counts * (xlogy(value, mean) - mean)
 
+    def log_constant(self, value: np.ndarray, counts: np.ndarray) -> np.ndarray:
+        return xlogy(counts * value, counts) - gammaln(counts * value + 1.0)
+
     def draw(self, rng: np.random.Generator, mean: np.ndarray, counts: np.ndarray) -> np.ndarray:
         return rng.poisson(np.clip(counts * mean, 0.0, LARGEST_COUNT)) / counts
 
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Independent Gaussian noise; each value is the average of `counts` [m] samples.
+    """Independent Gaussian noise; each value is the average of `counts` [m] samples. `log_density`
+    lacks `log_constant`.
 
     Attributes:
         sd_of: Its sd, from means to sds of the same shape, value by value.
@@ -80,6 +85,9 @@ class Gaussian:
         fine = np.isfinite(sd) & (sd > 0.0)
         sd = np.where(fine, sd, 1.0)
         return np.where(fine, -np.log(sd) - 0.5 * ((value - mean) / sd) ** 2, -np.inf)
+
+    def log_constant(self, value: np.ndarray, counts: np.ndarray) -> np.ndarray:
+        return np.full(len(value), -0.5 * np.log(2.0 * np.pi))
 
     def draw(self, rng: np.random.Generator, mean: np.ndarray, counts: np.ndarray) -> np.ndarray:
         sd = self.sd(mean, counts)
@@ -146,6 +154,15 @@ class Plain:
             at: Features around which this must be right [m]; None if they are not known yet.
         """
         return self.observed, self.given
+
+    def log_levels(self, at: np.ndarray, seen: tuple[np.ndarray, GivenNoise | None]) -> np.ndarray:
+        """Log density of each observed value, less that of its feature in Gaussian noise [m].
+
+        Args:
+            at: The features' means, around which this must be right [m].
+            seen: As `seen` has returned it.
+        """
+        return np.zeros(len(self.observed))
 
     def of(self, values: np.ndarray) -> np.ndarray:
         """Values [n, m] as features [n, m]."""
@@ -231,6 +248,13 @@ class ByMean:
         curvature = np.maximum((2.0 * here - more - less) / HALF_STEP**2, LEAST_CURVATURE)
         given = GivenNoise(1.0 / curvature, np.zeros((len(own), 0)))
         return near + slope / curvature, given
+
+    def log_levels(self, at: np.ndarray, seen: tuple[np.ndarray, GivenNoise | None]) -> np.ndarray:
+        features, noise = seen
+        variance = 1.0 if noise is None else noise.variance
+        density = self.law.log_density(self.observed, self.back(at), self.counts)
+        gaussian = -0.5 * (np.log(2.0 * np.pi * variance) + (features - at) ** 2 / variance)
+        return density + self.law.log_constant(self.observed, self.counts) - gaussian
 
     def _around(self, near: np.ndarray) -> np.ndarray:
         """Log densities of the observed values half a step below `near`, there and above [3, m]."""

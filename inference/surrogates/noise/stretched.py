@@ -51,6 +51,10 @@ class Stretched(Plain):
     def seen(self, at: np.ndarray | None) -> tuple[np.ndarray, GivenNoise | None]:
         return self.of(self.observed), self.given
 
+    def log_levels(self, at: np.ndarray, seen: tuple[np.ndarray, GivenNoise | None]) -> np.ndarray:
+        # the slope of the root, or of the logarithm
+        return -0.5 * self.stretch.power * np.log(self.observed + self.offset)
+
     def of(self, values: np.ndarray) -> np.ndarray:
         return self.stretch.of(values + self.offset)
 

@@ -88,12 +88,24 @@ def load(job: Job) -> tuple[Task, np.ndarray, Reference]:
         return TASKS[job.task], stored["observed"], reference
 
 
-def scores(log_density: Any, task: Task, reference: Reference) -> dict[str, float]:
+def scores(log_density: Any, reference: Reference) -> dict[str, float]:
     """Scores of a density: callable, points [n, d] -> [n]. Always called with `CHUNK` points."""
     points = reference.points
     padded = np.concatenate([points, np.repeat(points[:1], -len(points) % CHUNK, axis=0)])
     parts = [log_density(part) for part in padded.reshape(-1, CHUNK, points.shape[1])]
-    return score(np.concatenate(parts)[: len(points)], reference, task.bounds)._asdict()
+    return score(np.concatenate(parts)[: len(points)], reference)._asdict()
+
+
+def conclude(job: Job, row: dict[str, Any], reference: Reference, learn: Any) -> None:
+    """Write a row with the scores of the density that `learn` returns, or with why there is none.
+
+    `learn` puts into `row` what it measured: it is written in either case.
+    """
+    try:
+        row.update(scores(learn(), reference))
+    except Exception as error:  # noqa: BLE001  a peer may fail in any way, which is its result
+        row["error"] = f"{type(error).__name__}: {error}"[:300]
+    write(job, **row)
 
 
 def write(job: Job, **values: object) -> None:

@@ -54,7 +54,7 @@ def main(job: Job, imported: float) -> None:
         row = {"n": n, "engine_s": spent + concluded, "simulator_s": simulate.seconds}
         row.update(import_s=imported, simulations=simulate.runs, version=elfi.__version__)
         try:
-            row.update(scores(posterior.logpdf, task, reference))
+            row.update(scores(posterior.logpdf, reference))
         except ValueError as error:  # GPy's hyperparameters may run away to NaN
             write(job, **row, error=str(error))
             continue

@@ -5,19 +5,22 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 import numpyro.distributions as dist
+from bolfi_liquids.inference.engine_version import ENGINE_VERSION
 from tasks import Task
 
 from bolfi_liquids import inference
 
-from .job import Job, Stopwatch, load, receive, scores, write
+from .job import Job, Stopwatch, conclude, load, receive, write
 
 BATCH = 2  # points asked at once, `inference.fit`'s default
 WINDOW = 10  # simulations from a budget on over which the median cost of a step is taken
+CALL = {"confirm": 0, "warn": False, "progress": False}  # runs at draws would come on top of N
 COMPILED = "/jax/core/compile/backend_compile_duration"
 
 
@@ -37,7 +40,7 @@ SURROGATES: dict[str, Callable[[Task], Setting]] = {
     "discrepancy": lambda task: Setting(
         lambda signals: signals, {"surrogate": "discrepancy", "discrepancy": task.discrepancy}
     ),
-    "signal": lambda task: Setting(task.view, {"surrogate": "signal"}),
+    "signal": lambda task: Setting(task.view, {"noise": 0.0 if task.noise is None else task.noise}),
 }
 
 
@@ -64,12 +67,17 @@ def posterior(job: Job, imported: float) -> None:
     for i, n in enumerate(job.budgets):
         asked = question(job, task, observed)
         row = {"n": n, "import_s": imported, "version": version(), "fresh": i == 0}
-        run, log_density = fit(asked, n, job.timed)
-        if job.timed:
-            row |= {f"first_{name}": run[name] for name in ("engine_s", "nuts_s")}
-            run, log_density = fit(asked, n, job.timed)
-            row |= run
-        write(job, **row, **scores(log_density, task, reference))
+        conclude(job, row, reference, partial(learn, asked, n, job.timed, row))
+
+
+def learn(asked: Question, n: int, timed: bool, row: dict[str, Any]):
+    """Log density of the posterior: points [n, d] -> [n]; puts CPU seconds into `row`."""
+    run, log_density = fit(asked, n, timed)
+    if timed:
+        row |= {f"first_{name}": run[name] for name in ("engine_s", "nuts_s")}
+        run, log_density = fit(asked, n, timed)
+    row |= run
+    return log_density
 
 
 def fit(
@@ -78,18 +86,14 @@ def fit(
     """One run from nothing: its CPU seconds, and the log density of its posterior."""
     simulate = asked.simulate
     runs, simulator, before = simulate.runs, simulate.seconds, time.process_time()
-    fitted = inference.fit(simulate, asked.prior, asked.observed, budget=n, **asked.options)
+    fitted = inference.fit(simulate, asked.prior, asked.observed, budget=n, **CALL, **asked.options)
     simulator = simulate.seconds - simulator
     engine = time.process_time() - before - simulator
-    before = time.process_time()
+    spent = {"engine_s": engine, "simulator_s": simulator, "simulations": simulate.runs - runs}
     if timed:
+        before = time.process_time()
         fitted.sample("nuts", chains=4, draws=1000)
-    spent = {
-        "engine_s": engine,
-        "simulator_s": simulator,
-        "simulations": simulate.runs - runs,
-        "nuts_s": time.process_time() - before,
-    }
+        spent["nuts_s"] = time.process_time() - before
     return spent, lambda points: fitted.log_prob(asked.prior.to_dict(points))
 
 
@@ -130,7 +134,7 @@ class Compilations:
 
 
 def version() -> str:
-    return f"jax {jax.__version__}"
+    return f"engine {ENGINE_VERSION}, jax {jax.__version__}"
 
 
 KINDS = {"posterior": posterior, "steps": steps}

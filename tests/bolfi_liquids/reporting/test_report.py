@@ -170,15 +170,15 @@ def test_file_names_are_escaped(calibration, tmp_path):
     assert "&lt;script&gt;alert" in text
 
 
-def headline(run):
-    return re.search('<p class="headline">.*', bl.report(run, moving=False).read_text("utf-8"))[0]
+def poured(run):
+    return re.search("<dt>Pour</dt>\n(.*)", bl.report(run, moving=False).read_text("utf-8"))[1]
 
 
-def test_a_forced_pour_is_said_in_the_headline(pour, tmp_path, with_numbers):
+def test_a_forced_pour_is_said_first(pour, tmp_path, with_numbers):
     run = shutil.copytree(pour.path, tmp_path / "run")
-    assert "--force" not in headline(run)
+    assert "--force" not in poured(run)
     with_numbers(run, fit_rms_deg=2.1, noise_deg=0.24)
-    assert "--force" in headline(run)
+    assert "--force" in poured(run)
 
 
 def test_a_result_that_does_not_count_is_warned_of(pour, tmp_path, caplog):
@@ -257,10 +257,8 @@ def test_page_shows_the_criticism_before_the_pour(criticised):
     facts = {"criticism": criticism_facts(bl.Criticism.open(criticised))}
     for part in ("verdict", "criticism", "gap", "where", "undetectable"):
         for paragraph in prose(part, facts):
-            assert (
-                page.count(f"<p>{html.escape(paragraph, quote=False)}".replace("'", "&#39;")) == 1
-            )
-    assert page.index("Where they differ") < page.index("<h2>The pour")
+            assert page.count(f">{html.escape(paragraph, quote=False)}".replace("'", "&#39;")) == 1
+    assert page.index("Where they differ") < page.index('<h2 id="pour">')
     how = page[page.index("How this was made") :]
     assert "77 simulations" in how
     for text in ("clean.nc", "abc123", "camera_delay", "camera_tilt", "held_out"):

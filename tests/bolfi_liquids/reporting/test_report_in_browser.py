@@ -101,6 +101,29 @@ def test_a_click_plays_a_film_and_another_ends_it(opened):
     assert heard["console"] == []
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_wrong_on_a_phone_with_all_unfolded(browser, page, scheme):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    width, height = WIDTHS["phone"]
+    tab = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
+    tab.goto(page.as_uri())
+    tab.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+    found = axe.run(tab)
+    tab.close()
+    assert found.violations_count == 0, found.generate_report()
+
+
+def test_the_first_screen_of_a_phone_holds_every_answer(browser, page):
+    width, height = WIDTHS["phone"]
+    tab = browser.new_page(viewport={"width": width, "height": height})
+    tab.goto(page.as_uri())
+    ends = tab.evaluate(
+        "[...document.querySelectorAll('dt')].map((e) => e.getBoundingClientRect().bottom)"
+    )
+    tab.close()
+    assert len(ends) == 4 and max(ends) < height
+
+
 def test_films_show_all_of_the_stir_and_the_pour(films, calibration):
     time = calibration.tree["recorded"]["time"].to_numpy()
     shown = min(time[-1] - time[0], MAX_STIR_SECONDS)
