@@ -150,6 +150,14 @@ def test_elfi_s_tutorials(tmp_path, monkeypatch):
     assert_row("elfi", "| rejection, the nearest 4000", true)
     assert_row("elfi", "| this engine, budget 50", found)
     assert_near(found, true, shift=0.7, ratio=1.5)
+    options = {"summary": elfi["autocovariances"], "budget": 50, **elfi["one_by_one"]}
+    for seed in (1, 2):
+        other = inference.fit(
+            elfi["ma2"], elfi["fit"].prior, elfi["observed"], seed=seed, **options
+        )
+        found = moments(other.sample("quadrature")["posterior"])
+        t2 = 2 * found["height"][0] - 1, 2 * found["height"][1]
+        assert_row("elfi", f"| | {seed} |", {"t1": found["t1"], "t2": t2})
 
     n = 60_000
     theta = inference.Prior(elfi["ranges"]).from_unit(rng.random((n, 3)))
@@ -178,6 +186,14 @@ def test_sbi_s_first_tutorial(tmp_path, monkeypatch, capsys):
     assert_near(found, {name: (0.0, 0.1) for name in made["names"]}, shift=0.3, ratio=1.2)
     told = re.findall(r"\b[abc] (-?\d\.\d+) ± (\d\.\d+)", text("sbi"))
     assert np.allclose(np.array(told, float), list(found.values()), atol=0.01)
+    every = [*found.values()]
+    for seed in (1, 2):
+        data = np.ones(3)
+        fit = inference.fit(made["simulate"], made["prior"], data, budget=60, noise=0, seed=seed)
+        every += moments(fit.sample("emcee", draws=1000)["posterior"]).values()
+    means, sds = zip(*every, strict=True)
+    ends = [min(means), max(means), min(sds), max(sds)]
+    assert np.allclose(row("sbi", "| this engine | 63 |"), ends, atol=0.01)
 
 
 def test_asks_and_tells(tmp_path, monkeypatch, capsys):
