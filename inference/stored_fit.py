@@ -126,7 +126,7 @@ def _log_density(fit: Any) -> np.ndarray:
 def _opened(path: str | Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     check_kind("path", path, str | Path)
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         made = json.loads(arrays.pop(MADE))
     except UNREADABLE as error:

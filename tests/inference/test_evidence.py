@@ -73,6 +73,23 @@ def test_errors_cover_in_nine_of_ten_cases():
     assert covered.mean() >= 0.9
 
 
+def test_a_prior_of_a_misfit_costs_what_it_says():
+    simulate, prior, data, exact = polynomial(2, 0)
+    how = {"noise": SD["polynomial"], "budget": 40, "progress": False, "warn": False}
+    fit = inference.fit(simulate, prior, data, confirm=0, misfit=0.1, **how)
+    assert np.log(0.9) - 0.02 < fit.evidence.log - exact < 0.15
+
+
+def test_equal_outputs_have_no_evidence():
+    prior = inference.Prior({"a": dist.Normal(0.0, 1.0)})
+    fit = inference.fit(
+        lambda theta, _: np.ones((len(theta["a"]), TIME.size)),
+        *(prior, np.ones(TIME.size)),
+        **{"noise": 0.1, "budget": 10, "confirm": 0, "progress": False, "warn": False},
+    )
+    assert np.isnan(fit.evidence.log)
+
+
 def test_an_emulator_of_few_runs_says_that_it_knows_less():
     simulate, prior, data, _ = decay_task(0)
     few, many = (

@@ -196,6 +196,11 @@ def a_late_beginning():
     numpyro.sample("b", dist.Uniform(0.3, a))
 
 
+def a_rarely_late_beginning():
+    a = numpyro.sample("a", dist.Normal(0.0, 0.2))
+    numpyro.sample("b", dist.Uniform(a, 1.0))
+
+
 def a_number_of_the_first():
     a = numpyro.sample("a", dist.Uniform(0.0, 1.0))
     numpyro.sample("b", dist.Normal(np.ravel(a)[0], 1.0))
@@ -220,6 +225,7 @@ def the_same_twice():
         (a_vector, r"'a' must be univariate with shape \(\), got \(3,\)"),
         (a_branch, r"take arrays \[n\].*jnp.where"),
         (a_late_beginning, "proper distributions .*order of bounds"),
+        (a_rarely_late_beginning, "proper distributions .*order of bounds"),
         (a_number_of_the_first, "others than for numbers"),
         (a_whole_number, "'a' must be continuous"),
         (the_same_twice, "name each parameter once, got 'a'"),

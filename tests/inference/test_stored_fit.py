@@ -162,11 +162,19 @@ def test_another_engine_s_fit_and_other_files_are_refused(line_fit, tmp_path):
             archive.writestr(name, content)
     with pytest.raises(ValueError, match=r"version 0 of the engine"):
         Fit.load(path)
-    path.write_text("no archive")
-    with pytest.raises(ValueError, match="Fit.save"):
-        Fit.load(path)
+    content = path.read_bytes()
+    for damaged in (b"no archive", content[:-200], content[:2000] + b"x" * 400 + content[2400:]):
+        path.write_bytes(damaged)
+        with pytest.raises(ValueError, match="Fit.save"):
+            Fit.load(path)
     np.savez(tmp_path / "other.npz", a=1.0)
     with pytest.raises(ValueError, match="Fit.save"):
         Fit.load(tmp_path / "other.npz")
     with pytest.raises(FileNotFoundError):
         Fit.load(tmp_path / "none")
+
+
+def test_nothing_is_left_of_a_file_that_could_not_be_written(line_fit, tmp_path):
+    with pytest.raises(OSError):
+        line_fit.save(tmp_path)
+    assert not list(tmp_path.parent.glob("*.part"))

@@ -184,6 +184,28 @@ def ended(pid, within=10.0):
     return False
 
 
+@pytest.mark.parametrize("code", [0, 3])
+def test_nothing_goes_on_after_its_program(here, code):
+    run = one(
+        Program(f"sh -c 'sleep 600 & echo $! >{here}/pid; echo {{a}}; exit {code}'"), {"a": 1}
+    )
+    assert (run.error is None) == (code == 0)
+    assert ended((here / "pid").read_text().strip())
+
+
+def test_programs_share_a_bank_without_mixing_their_runs(here):
+    prior = inference.Prior({"a": dist.Uniform(0.0, 1.0)})
+    how = {"bank": here / "runs.sqlite", "budget": 8, "warn": False, "progress": False}
+    fits = [inference.fit(Program(f"echo {text}"), prior, [0.5], **how) for text in ("{a}", "1{a}")]
+    assert fits[0].best != fits[1].best
+
+
+@pytest.mark.parametrize("command", ["echo {}", "echo {a.real}", "echo {a:{width}}", "echo {0}"])
+def test_braces_without_a_plain_name_are_refused(command):
+    with pytest.raises(ValueError, match="command must have names in braces"):
+        Program(command)
+
+
 @pytest.mark.parametrize("workers", [None, 2])
 def test_what_hangs_is_killed_with_its_children(here, workers):
     """The child of the program ignores what can be ignored."""
