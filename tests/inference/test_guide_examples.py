@@ -103,3 +103,15 @@ def test_several_experiments(tmp_path, monkeypatch):
 
     found = moments(made["fit"].sample("emcee", draws=500)["posterior"])
     assert_near(found, exact(made["prior"], log_likelihood, 120))
+
+
+@pytest.mark.slow
+def test_cheap_runs(tmp_path, monkeypatch):
+    made = run(section("simulator", "Cheap runs help dear ones"), tmp_path, monkeypatch)
+
+    def log_likelihood(theta):
+        return -0.5 * np.sum(((made["observed"] - made["decay"](theta, None)) / 0.05) ** 2, axis=1)
+
+    assert made["fit"].status == "fitted"
+    found = moments(made["fit"].sample("quadrature")["posterior"])
+    assert_near(found, exact(made["fit"].prior, log_likelihood, 400))
