@@ -95,6 +95,7 @@ class Bolfi(Displayed):
         self.family = resolve(surrogate, options)
         self.observed = self.family.observe(observed)
         self._view = self.family.view(self.observed)
+        self.family.check_prior(self._view, prior)
         self.seed = checked_integer("seed", seed, 0)
         self.initial = checked_integer(
             "initial",

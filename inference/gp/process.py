@@ -51,13 +51,45 @@ class GP(NamedTuple):
     hyper: Hyper
     data: Data
     whitener: np.ndarray  # [k, n, n], inverse Cholesky factors of the Gram matrices
-    weights: np.ndarray  # [k, n], inverse Gram matrices times y
+    weights: np.ndarray  # [k, n], inverse Gram matrices times y, less what `prior` expects of it
+    prior: "Cheap | None" = None  # what a cheaper simulator says beforehand
 
-    def only(self, chosen: slice) -> "GP":
+    def only(self, chosen: slice | np.ndarray) -> "GP":
         """Some of the processes."""
         hyper = Hyper(*(part[chosen] for part in self.hyper))
         data = self.data._replace(y=self.data.y[chosen])
-        return GP(hyper, data, self.whitener[chosen], self.weights[chosen])
+        prior = None if self.prior is None else self.prior.only(chosen)
+        return GP(hyper, data, self.whitener[chosen], self.weights[chosen], prior)
+
+
+class Cheap(NamedTuple):
+    """What runs of a cheaper simulator say of processes y = offset + slope * cheap + rest.
+
+    The autoregressive model of Kennedy and O'Hagan (2000), eq. 1; the rest is the process of the
+    `GP` that holds this. `cheap` is known by its own runs alone, as in the recursion of Le Gratiet
+    and Garnier (2014), which need not be at the other's parameters.
+    """
+
+    gp: GP  # k processes, `cheap`
+    slope: np.ndarray  # [k]
+    offset: np.ndarray  # [k]
+    unit: np.ndarray  # [k], sd of the rest, by which its trend's prior is narrower
+
+    def only(self, chosen: slice | np.ndarray) -> "Cheap":
+        """For some of the processes."""
+        return Cheap(self.gp.only(chosen), *(part[chosen] for part in self[1:]))
+
+    def mean(self, u: Any) -> Any:
+        """Expected y [k, m] at u [m, d]."""
+        return self.offset[:, None] + self.slope[:, None] * predict_mean(self.gp, u)
+
+    def covariance(self, u: Any, v: Any) -> Any:
+        """Covariance [k, m, q] between u [m, d] and v [q, d] of what is expected."""
+        return self.slope[:, None, None] ** 2 * predict_joint(self.gp, u, v)
+
+    def variance(self, u: Any) -> Any:
+        """[k, m] at u [m, d]."""
+        return self.slope[:, None] ** 2 * predict(self.gp, u)[1]
 
 
 def coordinates(u: Any, tails: np.ndarray | None) -> Any:
@@ -81,7 +113,7 @@ def coordinates(u: Any, tails: np.ndarray | None) -> Any:
     return xp.where(tails == NO_TAIL, u, 0.5 + standard / 12.0**0.5)
 
 
-def covariance(hyper: Hyper, a: Any, b: Any) -> Any:
+def covariance(hyper: Hyper, a: Any, b: Any, unit: Any = None) -> Any:
     """Prior covariances [k, m, n] of the latent functions at coordinates a [m, d] and b [n, d].
 
     Squared exponential plus the trend a_j x_j^2 + b_j x_j + c of Gutmann and Corander
@@ -93,6 +125,9 @@ def covariance(hyper: Hyper, a: Any, b: Any) -> Any:
     prior's median, the trend's sds are 0.45 and 0.2 of the full ones). Else what few runs cannot
     exclude of a trend grows towards the edges of the box, and the likelihood, which knows the
     surrogate's uncertainty, shuns them.
+
+    Args:
+        unit: Of the trends' sds [k]; None is 1.
     """
     xp = namespace(a)
     squared = (a[:, None, :] - b) ** 2
@@ -100,14 +135,15 @@ def covariance(hyper: Hyper, a: Any, b: Any) -> Any:
     distance = rate @ squared.reshape(-1, squared.shape[-1]).T  # [k, m n]
     exponent = 2.0 * hyper.log_amplitude[:, None] - 0.5 * distance
     smooth = xp.exp(exponent).reshape(len(rate), *squared.shape[:2])
-    return smooth + TREND_SD**2 * trend(hyper, a) @ trend(hyper, b).mT
+    return smooth + TREND_SD**2 * trend(hyper, a, unit) @ trend(hyper, b, unit).mT
 
 
-def trend(hyper: Hyper, a: Any) -> Any:
-    """Basis 1, r_j x_j, (r_j x_j)^2 at x = 2a - 1: a [m, d] -> [k, m, 1 + 2d]."""
+def trend(hyper: Hyper, a: Any, unit: Any = None) -> Any:
+    """Basis 1, r_j x_j, (r_j x_j)^2 at x = 2a - 1, times `unit`: a [m, d] -> [k, m, 1 + 2d]."""
     xp = namespace(a)
     x = relevance(hyper)[:, None, :] * (2.0 * a - 1.0)
-    return xp.concat([xp.ones((*x.shape[:2], 1)), x, x**2], axis=2)
+    basis = xp.concat([xp.ones((*x.shape[:2], 1)), x, x**2], axis=2)
+    return basis if unit is None else unit[:, None, None] * basis
 
 
 def relevance(hyper: Hyper) -> Any:
@@ -124,16 +160,18 @@ def inverse_cholesky(matrix: np.ndarray) -> np.ndarray:
     return np.full_like(matrix, np.nan) if failed or singular else inverse
 
 
-def condition(hyper: Hyper, data: Data) -> GP:
+def condition(hyper: Hyper, data: Data, prior: Cheap | None = None) -> GP:
     """The processes given the data. Explicit inverse factors make prediction a product."""
-    at = coordinates(data.u, data.tails)
-    gram = covariance(hyper, at, at)
+    at, y = coordinates(data.u, data.tails), data.y
+    gram = covariance(hyper, at, at, prior and prior.unit)
+    if prior is not None:
+        gram, y = gram + prior.covariance(data.u, data.u), y - prior.mean(data.u)
     noise = data.noise(hyper.log_noise) + JITTER
     whitener = np.stack(
         [inverse_cholesky(g + np.diag(s)) for g, s in zip(gram, noise, strict=True)]
     )
-    white = np.einsum("kij,kj->ki", whitener, data.y)
-    return GP(hyper, data, whitener, np.einsum("kij,ki->kj", whitener, white))
+    white = np.einsum("kij,kj->ki", whitener, y)
+    return GP(hyper, data, whitener, np.einsum("kij,ki->kj", whitener, white), prior)
 
 
 def fantasize(gp: GP, u: np.ndarray, spread: np.ndarray | None = None) -> GP:
@@ -149,7 +187,7 @@ def fantasize(gp: GP, u: np.ndarray, spread: np.ndarray | None = None) -> GP:
     if data.spread is not None:
         new = np.full(len(u), np.median(data.spread)) if spread is None else spread
         spread = np.concatenate([data.spread, new])
-    return condition(gp.hyper, Data(np.concatenate([data.u, u]), y, data.tails, spread))
+    return condition(gp.hyper, Data(np.concatenate([data.u, u]), y, data.tails, spread), gp.prior)
 
 
 def padded(gp: GP, processes: int | None = None) -> GP:
@@ -163,16 +201,23 @@ def padded(gp: GP, processes: int | None = None) -> GP:
     u = np.pad(gp.data.u, ((0, extra), (0, 0)), constant_values=0.5)
     data = gp.data._replace(u=u, y=np.pad(gp.data.y, widths), spread=None)
     whitener = np.pad(gp.whitener, (*widths, (0, extra)))
-    return GP(hyper, data, whitener, np.pad(gp.weights, widths))
+    prior = gp.prior and Cheap(
+        padded(gp.prior.gp, processes), *(np.pad(part, (0, more)) for part in gp.prior[1:])
+    )
+    return GP(hyper, data, whitener, np.pad(gp.weights, widths), prior)
 
 
 def _cross(gp: GP, u: Any) -> tuple[Any, Any]:
     """Covariance [k, m, n] of the latent functions at u [m, d] and at the data; the variance
     [k, m] at u alone."""
-    xp = namespace(u)
+    xp, unit = namespace(u), gp.prior and gp.prior.unit
     at, there = (coordinates(points, gp.data.tails) for points in (u, gp.data.u))
-    trends = TREND_SD**2 * xp.sum(trend(gp.hyper, at) ** 2, axis=-1)
-    return covariance(gp.hyper, at, there), xp.exp(2.0 * gp.hyper.log_amplitude)[:, None] + trends
+    trends = TREND_SD**2 * xp.sum(trend(gp.hyper, at, unit) ** 2, axis=-1)
+    cross = covariance(gp.hyper, at, there, unit)
+    alone = xp.exp(2.0 * gp.hyper.log_amplitude)[:, None] + trends
+    if gp.prior is None:
+        return cross, alone
+    return cross + gp.prior.covariance(u, gp.data.u), alone + gp.prior.variance(u)
 
 
 def predict(gp: GP, u: Any) -> tuple[Any, Any]:
@@ -187,15 +232,19 @@ def predict(gp: GP, u: Any) -> tuple[Any, Any]:
 
 def predict_mean(gp: GP, u: Any) -> Any:
     """The means [k, m] alone."""
-    return (_cross(gp, u)[0] @ gp.weights[:, :, None])[:, :, 0]
+    return _mean(gp, u, _cross(gp, u)[0])
+
+
+def _mean(gp: GP, u: Any, cross: Any) -> Any:
+    mean = (cross @ gp.weights[:, :, None])[:, :, 0]
+    return mean if gp.prior is None else gp.prior.mean(u) + mean
 
 
 def _predict(gp: GP, u: Any) -> tuple[Any, Any]:
     xp = namespace(u)
     cross, alone = _cross(gp, u)
-    mean = (cross @ gp.weights[:, :, None])[:, :, 0]
     explained = xp.sum(_whitened(gp, cross) ** 2, axis=2)
-    return mean, xp.maximum(alone - explained, MIN_VARIANCE)
+    return _mean(gp, u, cross), xp.maximum(alone - explained, MIN_VARIANCE)
 
 
 def _whitened(gp: GP, cross: Any) -> Any:
@@ -206,7 +255,8 @@ def predict_joint(gp: GP, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Posterior covariance [k, m, q] of the latent functions between u [m, d] and v [q, d]."""
     at_u, at_v = _whitened(gp, _cross(gp, u)[0]), _whitened(gp, _cross(gp, v)[0])
     at, there = (coordinates(points, gp.data.tails) for points in (u, v))
-    return covariance(gp.hyper, at, there) - at_u @ at_v.mT
+    own = covariance(gp.hyper, at, there, gp.prior and gp.prior.unit) - at_u @ at_v.mT
+    return own if gp.prior is None else own + gp.prior.covariance(u, v)
 
 
 def draw(gp: GP, rng: np.random.Generator, u: np.ndarray, n: int) -> np.ndarray:

@@ -34,6 +34,7 @@ class TrainingData(NamedTuple):
     discrepancy: np.ndarray  # [n]
     tails: np.ndarray | None  # int [d], see `Prior.tails`
     runs: RunOutcomes  # all, failed ones too
+    prior: Prior | None = None  # of which the quantiles are
 
 
 class Measured(NamedTuple):
@@ -215,6 +216,13 @@ class Family(Protocol):
             ValueError: it cannot be learned from.
         """
         return observed
+
+    def check_prior(self, observed: Any, prior: Prior) -> None:
+        """Raise ValueError where the family's own options do not suit the prior.
+
+        Args:
+            observed: As `view` returned it.
+        """
 
     def measure(self, observed: Any, signals: Sequence[np.ndarray | None]) -> Measured:
         """Features and discrepancies of n signals, read-only and None where a run failed: here the

@@ -10,6 +10,7 @@ from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.namespaces import namespace
 from ..gp.process import (
     GP,
+    Cheap,
     Data,
     Hyper,
     condition,
@@ -32,6 +33,7 @@ MIN_NOISE_SHARE = 0.01  # share of noise in the outputs' variance from which its
 SIZE_ROUNDS = 2  # of learning sizes from errors, and the emulator with these sizes
 LEAST_OF_ERROR = 0.05  # of an expected squared error, added before its logarithm is taken
 NEEDED_NATS = 12.0  # log predictive density that a size by parameters must gain over a constant one
+NEEDED_OF_CHEAP = 4.0  # nats of a score's log predictive density that cheap runs must gain
 FIXED = np.log(0.7), 0.0, np.log(0.7)  # length, amplitude and noise of the process that asks first
 
 Units = Callable[[np.ndarray], np.ndarray]
@@ -143,6 +145,13 @@ class Size(NamedTuple):
         return namespace(u).clip(predict_mean(self.gp, u)[0], self.low, self.high)
 
 
+class CheapRuns(NamedTuple):
+    """Successful runs of a cheaper simulator of the same output."""
+
+    u: np.ndarray  # [n, d]
+    outputs: np.ndarray  # [n, m]
+
+
 class EmulatorLimits(NamedTuple):
     """Limits of an emulator.
 
@@ -151,11 +160,13 @@ class EmulatorLimits(NamedTuple):
         predicted: Share of a component's variance that the parameters must predict, lest it
             count as noise; None emulates every component.
         left: Variance of a value, in units of its scale, that components may leave at most.
+        cheap: Runs of a cheaper simulator, to be used where they help.
     """
 
     components: int
     predicted: float | None = PREDICTED_SHARE
     left: float = np.inf
+    cheap: CheapRuns | None = None
 
 
 class Emulator(NamedTuple):
@@ -333,7 +344,7 @@ def emulate(
         return _learned(Data(u, outputs.T, tails), units, limits)
     spread = run_spread(previous.size, u)
     targets = _targets(previous.basis, outputs, previous.learned_at, previous.excess)
-    gp = condition(previous.gp.hyper, Data(u, targets, tails, spread))
+    gp = condition(previous.gp.hyper, Data(u, targets, tails, spread), previous.gp.prior)
     kept = previous._replace(outputs=outputs)
     return _with_noise(kept, gp, _left(previous.basis, outputs, spread))
 
@@ -349,14 +360,22 @@ def _learned(
     share = max(EXPLAINED_SHARE, 1.0 - limits.left / varied) if varied else EXPLAINED_SHARE
     basis = principal_components(outputs, scale, limits.components, share, spread)
     data = known._replace(y=basis.scores(outputs).T, spread=spread)
-    hyper = maximum_a_posteriori(data)
+    hyper, prior = maximum_a_posteriori(data), None
+    if limits.cheap is not None:
+        u, made = limits.cheap
+        hyper, prior = _helped(hyper, data, CheapRuns(u, basis.scores(made)))
     if limits.predicted is not None:
-        basis, hyper = _predicted(basis, hyper, data, limits.predicted)
+        order, kept = _predicted(condition(hyper, data, prior), limits.predicted)
+        basis, hyper = basis.only(kept), Hyper(*(part[order] for part in hyper))
+        prior = prior and prior.only(order)
     remainder = _left(basis, outputs, spread)
     excess = _absorbed_noise(basis, np.exp(2.0 * hyper.log_noise), remainder, n)
     smaller = np.log1p(-excess)
     hyper = Hyper(hyper.log_length, hyper.log_amplitude + smaller, hyper.log_noise + smaller)
-    gp = condition(hyper, data._replace(y=_targets(basis, outputs, n, excess)))
+    if prior is not None:
+        slope, offset = ((1.0 - excess) * part for part in (prior.slope, prior.offset))
+        prior = prior._replace(slope=slope, offset=offset)
+    gp = condition(hyper, data._replace(y=_targets(basis, outputs, n, excess)), prior)
     found = Emulator(gp, basis, remainder, np.zeros(0), outputs, n, excess, limits, size)
     return _with_noise(found, gp, remainder)
 
@@ -388,17 +407,54 @@ def _with_noise(emulator: Emulator, gp: GP, remainder: Remainder) -> Emulator:
     return emulator._replace(gp=gp, remainder=remainder, noise=noise)
 
 
-def _predicted(basis: Basis, hyper: Hyper, data: Data, least: float) -> tuple[Basis, Hyper]:
-    """The components that the parameters predict, and the hyperparameters of their scores.
+def _helped(hyper: Hyper, data: Data, cheap: CheapRuns) -> tuple[Hyper, Cheap | None]:
+    """Hyperparameters of the scores, and what is expected of them by cheap runs.
+
+    Cheap runs are used for those scores that they predict better where a run is left out, with the
+    slope and offset of least squares. If there are none, no bit changes.
+
+    Args:
+        hyper: Without cheap runs.
+        data: Scores.
+        cheap: Scores of cheap runs for outputs [n, k].
+    """
+    u, scores = cheap
+    known = Data(u, ((scores - scores.mean(0)) / _divisor(scores.std(0))).T, data.tails)
+    gp = condition(maximum_a_posteriori(known), known)
+    x, y = predict_mean(gp, data.u), data.y
+    varied = x - x.mean(1, keepdims=True)
+    slope = np.sum(varied * y, axis=1) / _divisor(np.sum(varied**2, axis=1))
+    offset = np.mean(y - slope[:, None] * x, axis=1)
+    rest = y - offset[:, None] - slope[:, None] * x
+    unit = _divisor(rest.std(1))
+    length, amplitude, noise = maximum_a_posteriori(data._replace(y=rest / unit[:, None]))
+    own = Hyper(length, amplitude + np.log(unit), noise + np.log(unit))
+    prior = Cheap(gp, slope, offset, unit)
+    gain = _log_predictive(condition(own, data, prior)) - _log_predictive(condition(hyper, data))
+    helps = gain > NEEDED_OF_CHEAP
+    if not helps.any():
+        return hyper, None
+    found = [np.where(helps, a.T, b.T).T for a, b in zip(own, hyper, strict=True)]
+    return Hyper(*found), Cheap(gp, helps * slope, helps * offset, np.where(helps, unit, 1.0))
+
+
+def _log_predictive(gp: GP) -> np.ndarray:
+    """Log predictive density [k] of the targets where each run is left out."""
+    mean, variance = leave_one_out(gp)
+    return -0.5 * np.sum((gp.data.y - mean) ** 2 / variance + np.log(variance), axis=1)
+
+
+def _predicted(gp: GP, least: float) -> tuple[np.ndarray, np.ndarray]:
+    """The order in which the components that the parameters predict are in front, [k], and which
+    these are, bool [k].
 
     Of a noisy simulator's components most are noise. In few runs it may look like structure, by
     chance in one component out of several, and the likelihood then has bumps where there is
     nothing to be seen. So a component whose scores are hardly predicted when their runs are left
     out is left to the remainder: it could tell little, less than 0.2 nats of the parameters.
     """
-    kept = _predicted_share(condition(hyper, data)) > least
-    order = np.argsort(~kept, kind="stable")
-    return basis.only(kept), Hyper(*(part[order] for part in hyper))
+    kept = _predicted_share(gp) > least
+    return np.argsort(~kept, kind="stable"), kept
 
 
 def _predicted_share(gp: GP) -> np.ndarray:

@@ -5,7 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..arguments import check_called
+from ..arguments import check_called, is_table
 from .base import Family, Surrogate
 from .discrepancy import DiscrepancyFamily
 from .log_likelihood import LogLikelihoodFamily
@@ -78,6 +78,8 @@ def plain_options(family: Family) -> dict[str, Any] | None:
 
 def _is_plain(value: Any) -> bool:
     listed = isinstance(value, list | tuple) and not hasattr(value, "_fields")
+    if listed and any(is_table(one) for one in value):  # runs of a cheap simulator
+        return False
     if listed or hasattr(value, "__array__"):
         return np.asarray(value).dtype.kind in "biuf"
     return value is None or isinstance(value, bool | int | float | str)

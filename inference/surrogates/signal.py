@@ -9,15 +9,32 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._lazy import stats
-from ..arguments import check_callable, check_flag, checked_integer, checked_number
+from ..arguments import (
+    check_callable,
+    check_flag,
+    checked_integer,
+    checked_number,
+    is_table,
+    require,
+)
 from ..gp.optimise import minimise_in_box
 from ..gp.process import GP, fantasize
+from ..history import told_signals
+from ..prior import Prior, check_support
 from ..simulations.failures import Failure, not_finite
 from ..sobol import sobol
-from ..types import Discrepancy
+from ..types import Discrepancy, Theta
 from . import warnings
 from .base import Family, Measured, TrainingData
-from .emulator import PREDICTED_SHARE, Emulator, EmulatorLimits, emulate, resized, run_spread
+from .emulator import (
+    PREDICTED_SHARE,
+    CheapRuns,
+    Emulator,
+    EmulatorLimits,
+    emulate,
+    resized,
+    run_spread,
+)
 from .measurement_noise import (
     MIN_SIZE,
     NO_MEASUREMENT_NOISE,
@@ -46,6 +63,7 @@ MISFIT_POINTS = 1024  # among which the smallest misfit is looked for
 NEEDED = 0.95  # posterior probability of a misfit from which it is said
 LEAST_SEEN = 0.01  # of the outputs' sd, from which a misfit is worth a word
 MAX_COMPONENTS = 8
+MIN_CHEAP = 3  # successful runs of a cheap simulator
 SLOW = 0.9  # correlation of neighbouring samples from which noise looks like a signal
 
 
@@ -434,6 +452,9 @@ class SignalFamily(Family):
             20 % of the simulated mean; or a function from simulated means to sds, value by value.
             None estimates it: as an AR(1) process where the output is a series, of at least 5
             samples without a summary.
+        cheap: Runs (theta, signals) of a cheaper simulator of the same output, such as one of
+            coarser cells: name -> [n] in the prior's support, and [n, *signal_shape], NaN where a
+            run failed. Used as far as they predict the simulator's own runs.
         varying_noise: Whether the noise that the simulator makes itself may depend on the
             parameters and on the mean, where runs show that it does.
         misfit: Prior probability that the data are missed by more than the given noise, because
@@ -456,11 +477,16 @@ class SignalFamily(Family):
     predicted: float | None = PREDICTED_SHARE
     discrepancy: Discrepancy | None = None
     varying_noise: bool = True
+    cheap: tuple[Theta, ArrayLike] | None = None
 
     def __post_init__(self) -> None:
         check_callable("summary", self.summary)
         check_callable("discrepancy", self.discrepancy)
         check_flag("varying_noise", self.varying_noise)
+        pair = isinstance(self.cheap, tuple | list) and len(self.cheap) == 2
+        due = "be (theta, signals), theta a mapping of names to values, or None"
+        fits = self.cheap is None or (pair and is_table(self.cheap[0]))
+        require(fits, "cheap", due, self.cheap)
         checked_integer("components", self.components)
         if self.noise is not None and law_of(self.noise) is None:
             check_noise(self.noise)  # pyright: ignore[reportArgumentType]  no function is left
@@ -480,6 +506,25 @@ class SignalFamily(Family):
             return ObservedOutput(observed, output, ByMean(law, values, output.counts))
         given = None if self.noise is None else given_noise(self.noise, output)  # pyright: ignore[reportArgumentType]  no function is left
         return ObservedOutput(observed, output, Plain(values, given))
+
+    def check_prior(self, observed: ObservedOutput, prior: Prior) -> None:
+        if self.cheap is None:
+            return
+        check_support(prior, prior.to_dict(prior.to_array(self.cheap[0])))
+        runs = self._cheap_runs(observed, prior)
+        count = 0 if runs is None else len(runs.u)
+        due = f"hold {MIN_CHEAP} successful runs"
+        require(count >= MIN_CHEAP, "cheap", due, count, cure="simulate more")
+
+    def _cheap_runs(self, observed: ObservedOutput, prior: Prior | None) -> CheapRuns | None:
+        if self.cheap is None or prior is None:
+            return None
+        theta, signals = self.cheap
+        u = np.atleast_2d(prior.to_unit(theta))
+        shape = None if self.any_shape else observed.observed.shape
+        outputs = self.measure(observed, told_signals(signals, len(u), shape)[0]).features
+        good = np.isfinite(outputs).all(1)
+        return CheapRuns(u[good], outputs[good])
 
     def measure(self, observed: ObservedOutput, signals: Sequence[np.ndarray | None]) -> Measured:
         """Features are the output's values."""
@@ -528,7 +573,13 @@ class SignalFamily(Family):
             if self.varying_noise and isinstance(scale, Plain):
                 scale = stretched(scale, data.u, data.features, output.layout.channel)
         features, units = scale.of(data.features), scale.unit(output)
-        limits = EmulatorLimits(self.components, self.predicted, scale.left)
+        cheap = self._cheap_runs(data.observed, data.prior)
+        if cheap is not None:
+            with np.errstate(all="ignore"):  # cheap runs may lie where the scale has no value
+                made = scale.of(cheap.outputs)
+            finite = np.isfinite(made).all(1)
+            cheap = CheapRuns(cheap.u[finite], made[finite]) if finite.any() else None
+        limits = EmulatorLimits(self.components, self.predicted, scale.left, cheap)
         old = None if previous is None else previous.emulator
         emulator = emulate(data.u, features, units, limits, old, data.tails)
         if old is None and self.varying_noise:

@@ -246,3 +246,14 @@ def test_a_discrepancy_of_your_own(tmp_path, monkeypatch):
     assert np.allclose(fit.history.discrepancy, squares)
     slope, sd = np.linalg.lstsq(np.linspace(0, 1, 40)[:, None], data)[0][0], 0.1 / np.sqrt(13.5)
     assert_near(moments(fit.sample("quadrature")["posterior"]), {"a": (slope, sd)}, 0.5, 1.5)
+
+
+def test_cheap_runs(tmp_path, monkeypatch):
+    made = run(section("simulator", "Cheap runs help dear ones"), tmp_path, monkeypatch)
+
+    def log_likelihood(theta):
+        return -0.5 * np.sum(((made["observed"] - made["decay"](theta, None)) / 0.05) ** 2, axis=1)
+
+    assert made["fit"].status == "fitted"
+    found = moments(made["fit"].sample("quadrature")["posterior"])
+    assert_near(found, exact(made["fit"].prior, log_likelihood, 400))

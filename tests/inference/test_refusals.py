@@ -36,7 +36,7 @@ pytestmark = pytest.mark.filterwarnings(
 matplotlib.use("agg")
 
 MADE_BY_THE_ENGINE = {"Emulation", "Fit"}  # whose constructors are not for users
-CALLED_BY_THE_ENGINE = {"learn", "measure", "observe", "search", "view"}
+CALLED_BY_THE_ENGINE = {"check_prior", "learn", "measure", "observe", "search", "view"}
 OBSERVED = np.linspace(0.0, 1.0, 30)
 THETA = {"a": np.linspace(0.1, 0.9, 9)}
 PRIOR = inference.Prior({"a": dist.Uniform(0.0, 1.0)})

@@ -8,6 +8,7 @@ from bolfi_liquids.inference.gp import hyperparameters
 from bolfi_liquids.inference.gp.hyperparameters import log_marginal_likelihood
 from bolfi_liquids.inference.gp.process import (
     JITTER,
+    Cheap,
     Data,
     Hyper,
     condition,
@@ -31,7 +32,7 @@ def rows():
     return rng.uniform(size=(N, 2)), rng.normal(size=(1, N))
 
 
-def dense(a, b):
+def dense(a, b, unit=1.0):
     """The kernel written out: amplitude 0.9, lengths 0.3 and 0.8, trend sd 3 that fades."""
     fade = 1 / np.sqrt(1 + (np.array([0.3, 0.8]) / 0.5) ** 2)
     total = np.empty((len(a), len(b)))
@@ -39,7 +40,7 @@ def dense(a, b):
         for j, q in enumerate(b):
             x, y = fade * (2 * p - 1), fade * (2 * q - 1)
             smooth = 0.81 * np.exp(-0.5 * np.sum(((p - q) / [0.3, 0.8]) ** 2))
-            total[i, j] = smooth + 9.0 * (1 + x @ y + x**2 @ y**2)
+            total[i, j] = smooth + 9.0 * unit**2 * (1 + x @ y + x**2 @ y**2)
     return total
 
 
@@ -92,6 +93,54 @@ def test_what_is_found_of_a_process_depends_on_no_other():
                 np.testing.assert_array_equal(whole[i], alone[0])
         one, other = (predict(condition(*of), data.u)[0] for of in ((hyper, data), own))
         np.testing.assert_allclose(one[-1:], other, rtol=1e-7, atol=1e-9)
+
+
+@pytest.fixture
+def helped(rows):
+    """Processes that a cheap simulator's 20 runs say much of, and these runs."""
+    rng = np.random.default_rng(8)
+    there, cheap = rng.uniform(size=(20, 2)), rng.normal(size=(1, 20))
+    known = condition(HYPER, Data(there, cheap))
+    prior = Cheap(known, *(np.array([number]) for number in (0.7, 0.4, 0.1)))
+    return condition(HYPER, Data(*rows), prior), there, cheap
+
+
+def test_cheap_runs_make_it_cokriging(rows, helped):
+    """All runs at once, by the joint covariance of both simulators (Kennedy and O'Hagan 2000)."""
+    (u, y), (fitted, there, cheap) = rows, helped
+    new = np.random.default_rng(0).uniform(size=(300, 2))
+
+    def dear(a, b):
+        return 0.7**2 * dense(a, b) + dense(a, b, 0.1)
+
+    across = 0.7 * dense(there, u)
+    gram = np.block([[dense(there, there), across], [across.T, dear(u, u)]]) + NOISE * np.eye(32)
+    cross = np.concatenate([0.7 * dense(there, new), dear(u, new)])
+    mean, variance = predict(fitted, new)
+    due = np.linalg.solve(gram, np.concatenate([cheap[0], y[0] - 0.4]))
+    np.testing.assert_allclose(mean[0], 0.4 + cross.T @ due, rtol=1e-6, atol=1e-8)
+    joint = dear(new[:9], new) - cross[:, :9].T @ np.linalg.solve(gram, cross)
+    np.testing.assert_allclose(variance[0, :9], np.diag(joint), rtol=1e-6)
+    np.testing.assert_allclose(predict_joint(fitted, new[:9], new)[0], joint, rtol=1e-6, atol=1e-8)
+    with jax.enable_x64(True):
+        traced = jax.jit(predict)(padded(fitted, 3), jnp.asarray(new[:5]))
+    for one, other in zip(traced, (mean, variance), strict=True):
+        np.testing.assert_allclose(one[:1], other[:, :5], rtol=1e-8)
+
+
+def test_cheap_runs_stay_while_others_are_left_out_or_fantasised(rows, helped):
+    (u, y), (fitted, *_) = rows, helped
+    mean, variance = leave_one_out(fitted)
+    for i in range(N):
+        rest = np.arange(N) != i
+        refitted = condition(HYPER, Data(u[rest], y[:, rest]), fitted.prior)
+        expected = predict(refitted, u[i : i + 1])
+        np.testing.assert_allclose(mean[0, i], expected[0][0, 0], rtol=1e-7, atol=1e-10)
+        np.testing.assert_allclose(variance[0, i], expected[1][0, 0] + NOISE, rtol=1e-7)
+    new = np.array([[0.4, 0.7], [0.1, 0.2]])
+    believed = predict(fantasize(fitted, new), new)
+    np.testing.assert_allclose(believed[0], predict(fitted, new)[0], rtol=1e-7)
+    assert (believed[1] < predict(fitted, new)[1]).all()
 
 
 @pytest.mark.parametrize("given", [True, False])
