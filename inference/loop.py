@@ -102,7 +102,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         initial: Points of the start design; None is 2 d + 6, or the budget if that is less.
         executor: A thread or process pool, a Dask client or any other
             `concurrent.futures.Executor`, left open; or a Dask scheduler's address such as
-            "tcp://host:8786". Start processes by "spawn" or "forkserver": JAX does not survive
+            `"tcp://host:8786"`. Start processes by "spawn" or "forkserver": JAX does not survive
             a fork. Workers import `simulate`, but not JAX.
         bank: A path, or a bank that other runs share; it is left open then. Every simulation
             is stored when its call is finished, and what another run is simulating for the same

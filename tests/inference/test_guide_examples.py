@@ -230,6 +230,12 @@ def test_executors_of_the_cluster_page(tmp_path):
     subprocess.run([sys.executable, "-c", EXECUTORS], cwd=tmp_path, check=True, timeout=120)
 
 
+def test_an_effect_of_your_own_simulator(tmp_path, monkeypatch):
+    assert run(section("criticism", "In your own simulator"), tmp_path, monkeypatch)[
+        "found"
+    ].accepted == ("bend",)
+
+
 def test_a_discrepancy_of_your_own(tmp_path, monkeypatch):
     imports = section("simulator", "Parameters").split("\n\n\ndef")[0] + "\n```"
     made = run(imports + section("simulator", "Surrogates"), tmp_path, monkeypatch)
