@@ -243,8 +243,9 @@ def _mean(gp: GP, u: Any, cross: Any) -> Any:
 def _predict(gp: GP, u: Any) -> tuple[Any, Any]:
     xp = namespace(u)
     cross, alone = _cross(gp, u)
+    mean = _mean(gp, u, cross)
     explained = xp.sum(_whitened(gp, cross) ** 2, axis=2)
-    return _mean(gp, u, cross), xp.maximum(alone - explained, MIN_VARIANCE)
+    return mean, xp.maximum(alone - explained, MIN_VARIANCE)
 
 
 def _whitened(gp: GP, cross: Any) -> Any:
