@@ -177,7 +177,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     if budget or simulate is not None:
         check_function("simulate", simulate)
     simulator = for_engine(simulate, vectorised, together, time_limit)
-    identity = identity or getattr(simulator, "identity", "")
+    identity = identity or simulator.identity
     told = _length(checked_prior(prior), earlier)
     due = f"hold {MOST_SIMULATIONS - budget} simulations at most with budget={budget}"
     require(

@@ -77,9 +77,7 @@ LEAST_EFFECTIVE = 32.0  # points of a population that stand for a posterior
 MUCH_DOUBT = 1.5  # see `Fit.doubt`: beyond it more is simulated, and a fit warns
 MOST_MORE = 1000  # runs, of which `Fit.interval_error` tells
 TEN_MORE = 10  # runs, of which a printed fit says what they would bring
-NO_DEPENDENCE = (
-    0.1  # nats, sd over draws: what weighs draws by powers of the likelihood hardly sees it
-)
+NO_DEPENDENCE = 0.1  # nats, sd over draws, too small to matter to powers of the likelihood
 SAMPLE_DIMS = ("chain", "draw")
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
 
@@ -574,8 +572,9 @@ class Fit(Displayed):
                 that must be given is missing, or is not what the fit was made with, by its
                 description, or by discrepancies and posterior densities at the simulations.
         """
-        made = cls(**read_fit(path, prior, surrogate, options))
-        check_same(path, made)
+        fields, arrays = read_fit(path, prior, surrogate, options)
+        made = cls(**fields)
+        check_same(path, arrays, made)
         return made
 
     def check(self, n: int = 200, **how: Any) -> Any:

@@ -76,8 +76,8 @@ def write_fit(path: str | Path, fit: Any) -> Path:
 
 def read_fit(
     path: str | Path, prior: Prior | None, surrogate: Family | None, options: Mapping[str, Any]
-) -> dict[str, Any]:
-    """The fields of a `Fit`, see `Fit.load`."""
+) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """The fields of a `Fit`, see `Fit.load`, and the arrays of its file."""
     made, arrays = _opened(path)
     prior = _checked_prior(made, prior)
     family = _family(made, arrays, surrogate, options)
@@ -94,7 +94,7 @@ def read_fit(
         told, asked = made["before"]["told"], made["before"]["asked"]
         earlier = learned(history.first(told), asked)
         before = Before(arrays["mean"], arrays["sd"], earlier, told, arrays["drawn"], asked)
-    return {
+    fields = {
         "prior": prior,
         "observed": observed,
         "history": history,
@@ -106,11 +106,11 @@ def read_fit(
         "asked": made["asked"],
         "options": _stored_options(made, arrays) if made["own_family"] else None,
     }
+    return fields, arrays
 
 
-def check_same(path: str | Path, fit: Any) -> None:
+def check_same(path: str | Path, arrays: Mapping[str, np.ndarray], fit: Any) -> None:
     """Raise ValueError unless a loaded fit concludes what the stored one did."""
-    _, arrays = _opened(path)
     for what, now in (("discrepancy", fit.history.discrepancy), ("log_density", _log_density(fit))):
         if not np.allclose(now, arrays[what], rtol=SAME, atol=SAME, equal_nan=True):
             raise ValueError(

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from ..inference.simulations import Compute
 
 PREDICTIVE_DRAWS = 8
-HAVING_A_SIGNAL_PER_DRAW = ["log_likelihood", "log_prior", "prior_predictive"]  # tens of megabytes
+NOT_KEPT = ["log_likelihood", "log_prior", "prior_predictive"]  # tens of megabytes
 THETA_STAR_REPLICATES = 4  # seeds at theta*, for the noise between seeds
 GRID_POINTS = 61  # of either half of an axis of the surface
 GRID_SCORES = 3.5  # normal score of the posterior's last quantile on it, to either side
@@ -212,7 +212,7 @@ def results_tree(
         dims = (*leading, "frame", "plane")
         return Dataset({"inclination": (dims, values, {"units": "rad"})}, coords=frames)
 
-    tree = sampled.drop_nodes(HAVING_A_SIGNAL_PER_DRAW, errors="ignore")
+    tree = sampled.drop_nodes(NOT_KEPT, errors="ignore")
     numbers = {"discrepancy": closest.discrepancy, **closest.theta}
     added = {
         "recorded": inclination(stirring.observed),

@@ -285,6 +285,12 @@ def leave_one_out(gp: GP) -> tuple[np.ndarray, np.ndarray]:
     return gp.data.y - gp.weights * variance, variance
 
 
+def leave_one_out_log_densities(gp: GP) -> np.ndarray:
+    """Log density [k, n] of each y given all others, less the constant -log(2 pi) / 2."""
+    mean, variance = leave_one_out(gp)
+    return -0.5 * ((gp.data.y - mean) ** 2 / variance + np.log(variance))
+
+
 def leave_one_out_errors(gp: GP, n: int) -> np.ndarray:
     """Studentised errors [n, k] at the first n points; those after them are fantasised."""
     mean, variance = leave_one_out(gp)

@@ -12,7 +12,7 @@ from concurrent.futures import Future
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import NamedTuple, cast
+from typing import ClassVar, NamedTuple, cast
 
 import numpy as np
 
@@ -103,6 +103,7 @@ class BatchSimulator:
     """
 
     simulate: Simulator
+    identity: ClassVar[str] = ""  # see `OneByOne`
     together: int = field(default=1, compare=False)
     time_limit: Limit | None = field(default=None, compare=False)
     neutral: Mapping[str, float] = field(default_factory=dict, compare=False)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arguments import check_callable, check_choice
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
-from ..gp.process import GP, Data, condition, leave_one_out, predict
+from ..gp.process import GP, Data, condition, leave_one_out_log_densities, predict
 from ..types import Discrepancy
 from . import warnings
 from .base import Family, Measured, TrainingData, flattened
@@ -242,9 +242,7 @@ def _standardise(transform: Transform, values: np.ndarray) -> DiscrepancyScale:
 def _score(gp: GP, scale: DiscrepancyScale, values: np.ndarray) -> float:
     """Leave-one-out log predictive density of the discrepancy under the scale, summed over the
     better half of the runs: with a wide prior the others only tell that they are bad."""
-    mean, variance = (moment[0] for moment in leave_one_out(gp))
-    residual = gp.data.y[0] - mean
-    density = -0.5 * (residual**2 / variance + np.log(2.0 * np.pi * variance))
+    (density,) = leave_one_out_log_densities(gp)
     jacobian = scale.transform.log_jacobian(values) - np.log(scale.spread)
     return float(np.sum((density + jacobian)[values <= np.median(values)]))
 

@@ -16,6 +16,7 @@ from ..gp.process import (
     condition,
     leave_one_out,
     leave_one_out_errors,
+    leave_one_out_log_densities,
     predict,
     predict_mean,
 )
@@ -430,18 +431,13 @@ def _helped(hyper: Hyper, data: Data, cheap: CheapRuns) -> tuple[Hyper, Cheap | 
     length, amplitude, noise = maximum_a_posteriori(data._replace(y=rest / unit[:, None]))
     own = Hyper(length, amplitude + np.log(unit), noise + np.log(unit))
     prior = Cheap(gp, slope, offset, unit)
-    gain = _log_predictive(condition(own, data, prior)) - _log_predictive(condition(hyper, data))
-    helps = gain > NEEDED_OF_CHEAP
+    beside, alone = condition(own, data, prior), condition(hyper, data)
+    densities = leave_one_out_log_densities(beside), leave_one_out_log_densities(alone)
+    helps = densities[0].sum(1) - densities[1].sum(1) > NEEDED_OF_CHEAP
     if not helps.any():
         return hyper, None
     found = [np.where(helps, a.T, b.T).T for a, b in zip(own, hyper, strict=True)]
     return Hyper(*found), Cheap(gp, helps * slope, helps * offset, np.where(helps, unit, 1.0))
-
-
-def _log_predictive(gp: GP) -> np.ndarray:
-    """Log predictive density [k] of the targets where each run is left out."""
-    mean, variance = leave_one_out(gp)
-    return -0.5 * np.sum((gp.data.y - mean) ** 2 / variance + np.log(variance), axis=1)
 
 
 def _predicted(gp: GP, least: float) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from scipy.special import ndtr, ndtri
 
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.namespaces import namespace
-from ..gp.process import GP, Data, condition, leave_one_out, predict
+from ..gp.process import GP, Data, condition, leave_one_out_log_densities, predict
 from ..sampling.importance import explore
 from ..sampling.target import Target
 from ..simulations.failures import Failure, impossible, incomparable, not_finite
@@ -207,8 +207,7 @@ def _scales(values: np.ndarray) -> list[LogLikelihoodScale]:
 def _score(gp: GP, scale: LogLikelihoodScale, values: np.ndarray) -> float:
     """Leave-one-out log predictive density of the log likelihoods that count, or of the best
     quarter, in nats."""
-    mean, variance = (moment[0] for moment in leave_one_out(gp))
-    density = -0.5 * ((gp.data.y[0] - mean) ** 2 / variance + np.log(variance))
+    (density,) = leave_one_out_log_densities(gp)
     near = values >= min(values.max() - NEAR, np.quantile(values, 0.75))
     return float(np.sum((density - np.log(scale.spread * scale.folds(values)))[near]))
 

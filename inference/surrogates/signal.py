@@ -526,6 +526,16 @@ class SignalFamily(Family):
         good = np.isfinite(outputs).all(1)
         return CheapRuns(u[good], outputs[good])
 
+    def _cheap_features(self, data: TrainingData, scale: OutputScale) -> CheapRuns | None:
+        """Cheap runs on the emulator's scale, where they have a value on it."""
+        runs = self._cheap_runs(data.observed, data.prior)
+        if runs is None:
+            return None
+        with np.errstate(all="ignore"):
+            features = scale.of(runs.outputs)
+        finite = np.isfinite(features).all(1)
+        return CheapRuns(runs.u[finite], features[finite]) if finite.any() else None
+
     def measure(self, observed: ObservedOutput, signals: Sequence[np.ndarray | None]) -> Measured:
         """Features are the output's values."""
         array, output, scale = observed
@@ -573,14 +583,10 @@ class SignalFamily(Family):
             if self.varying_noise and isinstance(scale, Plain):
                 scale = stretched(scale, data.u, data.features, output.layout.channel)
         features, units = scale.of(data.features), scale.unit(output)
-        cheap = self._cheap_runs(data.observed, data.prior)
-        if cheap is not None:
-            with np.errstate(all="ignore"):  # cheap runs may lie where the scale has no value
-                made = scale.of(cheap.outputs)
-            finite = np.isfinite(made).all(1)
-            cheap = CheapRuns(cheap.u[finite], made[finite]) if finite.any() else None
-        limits = EmulatorLimits(self.components, self.predicted, scale.left, cheap)
         old = None if previous is None else previous.emulator
+        # what goes on keeps what it has of cheap runs
+        cheap = self._cheap_features(data, scale) if old is None else None
+        limits = EmulatorLimits(self.components, self.predicted, scale.left, cheap)
         emulator = emulate(data.u, features, units, limits, old, data.tails)
         if old is None and self.varying_noise:
             emulator = resized(emulator, units)
