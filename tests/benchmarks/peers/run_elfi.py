@@ -43,6 +43,10 @@ def main(job: Job, imported: float) -> None:
     bolfi = elfi.BOLFI(model["log_discrepancy"], bounds=dict(task.ranges), seed=job.seed)
     spent = 0.0
     for n in job.budgets:
+        if n < bolfi.n_initial_evidence:  # by its default 2^d + 1: it would have no surrogate
+            error = f"a start design of {bolfi.n_initial_evidence} simulations"
+            write(job, n=n, import_s=imported, version=elfi.__version__, error=error)
+            continue
         before, simulator = time.process_time(), simulate.seconds
         bolfi.set_objective(n)
         while not bolfi.finished:
