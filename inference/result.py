@@ -395,17 +395,19 @@ class Fit(Displayed):
     def evidence(self) -> Evidence:
         """Log of the probability density of what was observed, averaged over the prior.
 
-        Differences between models of the same data are logs of Bayes factors. Of the surrogate
-        "discrepancy" it is the probability of a discrepancy below the threshold; of
-        "log_likelihood" it has the constant that the simulator's values have, and of `fit_losses`
-        none: it then tells models of one noise apart, not noises. The option `misfit` is a part of
-        the model, which costs up to log(1 - misfit) nats where nothing is missed: the evidence of
-        the given noise alone takes misfit=0. NaN where all outputs are equal. The error holds
-        chance and what the emulator does not know; noise that is estimated from runs counts as
-        known.
+        It is that of the model as it is stated: the simulator and the noise, without the misfit
+        that keeps the posterior from trusting either too far. Differences between models of the
+        same data are logs of Bayes factors. Of the surrogate "discrepancy" it is the probability of
+        a discrepancy below the threshold; of "log_likelihood" it has the constant that the
+        simulator's values have, and of `fit_losses` none: it then tells models of one noise apart,
+        not noises. NaN where all outputs are equal. The error holds chance and what the emulator
+        does not know; noise that is estimated from runs counts as known.
         """
-        learned = self.learned
-        log, error = evidence_of(self.population, self._target, learned.log_second_moment)
+        learned, population = self.learned.stated, self.population
+        target = Target(learned.log_likelihood, len(self.prior))
+        if learned is not self.learned:
+            population = explore(np.random.default_rng(0), target)
+        log, error = evidence_of(population, target, learned.log_second_moment)
         error = float(np.sqrt(error**2 + learned.log_variance))
         return Evidence(log + learned.log_constant, error)
 

@@ -89,6 +89,12 @@ class Surrogate(Protocol):
         return self
 
     @property
+    def stated(self) -> "Surrogate":
+        """The surrogate of the model as the user states it, without what guards against its being
+        wrong."""
+        return self
+
+    @property
     def sure(self) -> LogLikelihood:
         """The log likelihood, were what is emulated known."""
         return self.log_likelihood

@@ -110,6 +110,14 @@ class SignalSurrogate(OfProcesses):
         return found._replace(success=self.success)
 
     @property
+    def stated(self) -> "SignalSurrogate":
+        """The surrogate without a misfit beside the noise that was given."""
+        if self.known is None or not self.nodes.sigma.any():
+            return self
+        found = observe(self.emulator, self.output, self.observed, self.known, 0.0)
+        return replace(found, box=self.box, success=self.success, scale=self.scale)
+
+    @property
     def sure(self) -> SignalLikelihood:
         """The log likelihood, were the simulator the emulator's mean. What looks like run-to-run
         noise, but repeated runs do not bear out, is doubt, too."""
