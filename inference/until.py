@@ -16,8 +16,8 @@ EVERY = 5  # simulations between two looks
 class Until:
     """A budget of `fit` that ends when the posterior is known well enough.
 
-    That is looked at after the start design, every fifth simulation. A fit with warnings goes on to
-    `most` simulations.
+    That is looked at after the start design, every fifth simulation, and must be so twice in a row:
+    the first time may be luck. A fit with warnings goes on to `most` simulations.
 
     Attributes:
         tolerance: Of the error.
@@ -60,15 +60,17 @@ def checked_budget(budget: object, least: int) -> tuple[int, Until | None]:
 
 
 def enough(engine: Bolfi, until: Until | None) -> Callable[[], bool]:
-    """A function that looks, after the start design at every fifth simulation, whether to stop."""
-    looked = engine.initial
+    """A function that says whether to stop: after the start design it looks at every fifth
+    simulation."""
+    looked, reached = engine.initial, False
 
     def stop() -> bool:
-        nonlocal looked
+        nonlocal looked, reached
         early = engine.told < looked + EVERY or engine.succeeded < MIN_LEARN
         if until is None or early:
             return False
-        looked = engine.told
-        return until._reached(engine.fit(warn=False))
+        before, looked = reached, engine.told
+        reached = until._reached(engine.fit(warn=False))
+        return before and reached
 
     return stop
