@@ -24,6 +24,7 @@ from .measurement_noise import MIN_SIZE, Remainder, shrunk_covariance
 from .squared_difference import independent
 
 EXPLAINED_SHARE = 0.9995  # of the variance, to be explained by components
+EXPLAINED_IF_EXACT = 0.99999  # the same of a simulator that makes no noise
 PREDICTED_SHARE = 0.3  # see `_predicted`
 PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
 MAX_ABSORBED_SHARE = 0.9  # of a score that may count as its own run's noise
@@ -209,9 +210,7 @@ class Emulator(NamedTuple):
     @property
     def repeats(self) -> np.ndarray:
         """Of each run at the parameters of one before: whether its output differs, bool [r]."""
-        first, again = repeated(self.gp.data.u[: len(self.outputs)])
-        differ = np.abs(self.outputs[again] - self.outputs[first])
-        return (differ > EQUAL_RUNS_TOLERANCE * self.outputs.std(0)).any(1)
+        return differing(self.gp.data.u[: len(self.outputs)], self.outputs)
 
     def spread(self, u: np.ndarray) -> np.ndarray:
         """Variance of the run-to-run noise at u [n, d] over that of the size 1, [n]."""
@@ -324,6 +323,13 @@ def repeated(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return order[same], order[same + 1]
 
 
+def differing(u: np.ndarray, outputs: np.ndarray) -> np.ndarray:
+    """Of each run at u [n, d] of one before: whether its output [n, m] differs, bool [r]."""
+    first, again = repeated(u)
+    differ = np.abs(outputs[again] - outputs[first])
+    return (differ > EQUAL_RUNS_TOLERANCE * outputs.std(0)).any(1)
+
+
 def emulate(
     u: np.ndarray,
     outputs: np.ndarray,
@@ -356,16 +362,18 @@ def _learned(
     """Components and hyperparameters of outputs known.y [m, n], the run-to-run noise being of a
     known size."""
     outputs, n, spread = known.y.T, len(known.u), run_spread(size, known.u)
-    scale = units(outputs)
+    scale, differ = units(outputs), differing(known.u, outputs)
+    exact = len(differ) > 0 and not differ.any()
+    share = EXPLAINED_IF_EXACT if exact else EXPLAINED_SHARE
     varied = float(np.mean(np.var(outputs, axis=0) / scale**2))
-    share = max(EXPLAINED_SHARE, 1.0 - limits.left / varied) if varied else EXPLAINED_SHARE
+    share = max(share, 1.0 - limits.left / varied) if varied else share
     basis = principal_components(outputs, scale, limits.components, share, spread)
     data = known._replace(y=basis.scores(outputs).T, spread=spread)
     hyper, prior = maximum_a_posteriori(data), None
     if limits.cheap is not None:
         u, made = limits.cheap
         hyper, prior = _helped(hyper, data, CheapRuns(u, basis.scores(made)))
-    if limits.predicted is not None:
+    if limits.predicted is not None and not exact:
         order, kept = _predicted(condition(hyper, data, prior), limits.predicted)
         basis, hyper = basis.only(kept), Hyper(*(part[order] for part in hyper))
         prior = prior and prior.only(order)
