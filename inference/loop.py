@@ -15,9 +15,7 @@ from .arguments import (
     check_function,
     check_progress,
     check_text,
-    checked_array,
     checked_integer,
-    checked_number,
     is_table,
     require,
 )
@@ -36,11 +34,12 @@ from .simulations.job import (
     jobs,
     simulation_seed,
 )
+from .simulations.program import check_names
 from .simulations.runner import Runner
 from .sobol import start_size
 from .surrogates.base import Acquisition, Family
 from .surrogates.warnings import complain
-from .types import Simulator, SingleSimulator, Theta
+from .types import Simulator, SingleSimulator
 from .until import Until, checked_budget, enough
 
 
@@ -179,6 +178,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     simulator = for_engine(simulate, vectorised, together, time_limit)
     identity = identity or simulator.identity
     told = _length(checked_prior(prior), earlier)
+    check_names(simulator, prior.names)
     due = f"hold {MOST_SIMULATIONS - budget} simulations at most with budget={budget}"
     require(
         budget + told <= MOST_SIMULATIONS, "earlier", due, told, cure="leave the least useful out"
@@ -208,9 +208,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         )
         schedule = _in_rounds if in_rounds else _in_flight
         finished = schedule(engine, runner, budget, batch, enough(engine, until))
-        seconds = 0.0
-        for simulation in finished:
-            seconds += simulation.seconds
+        for _ in finished:
             advance(1)
         _check_learnable(engine, runner)
         budget = engine.told - told
@@ -224,14 +222,13 @@ def fit(  # noqa: PLR0913  the one call that most users make
             engine.recipe = Recipe(
                 simulator, identity, until or budget, own, fit, _check, _criticise
             )
-        made = engine.fit({"simulator": seconds}, warn=False)
+        made = engine.fit({"simulator": runner.seconds}, warn=False)
         if simulate is None and made.learned.unreached:  # a table of losses, not of outputs
             raise ValueError(made.learned.unreached[0])
         for _ in range(_confirmations(engine, budget, confirm)):
-            for simulation in _confirmation(engine, made, runner, confirm):
-                seconds += simulation.seconds
+            for _ in _confirmation(engine, made, runner, confirm):
                 advance(1)
-            made = engine.fit({"simulator": seconds}, warn=False)
+            made = engine.fit({"simulator": runner.seconds}, warn=False)
             if made.confirmed and made.doubt < MUCH_DOUBT:
                 break
     if warn:
@@ -258,76 +255,6 @@ def _criticise(made: Fit, extensions: Mapping[str, Any], **how: Any) -> Any:
     from .criticism import criticise_fit
 
     return criticise_fit(made, extensions, **how)
-
-
-def fit_losses(
-    theta: Theta,
-    loss: ArrayLike,
-    prior: Prior,
-    *,
-    noise: float | None = None,
-    n: int | None = None,
-    warn: bool = True,
-) -> Fit:
-    """Infer parameters from losses that are sums of squares, as an optimiser leaves them.
-
-    With a known noise the log likelihood is -loss / (2 noise^2); with an unknown one, of prior
-    1 / noise, it is -(n / 2) log(loss). Any other loss is a log likelihood by your own formula:
-    `fit(None, prior, surrogate="log_likelihood", budget=0, earlier=(theta, values))`.
-
-    Args:
-        theta: Name -> [m], in the prior's support; it may be a data frame.
-        loss: Sum over n data of (datum - model)^2 [m]; NaN is a failed trial, and inf is
-            impossible.
-        prior: The parameters and their priors, such as the ranges of the search.
-        noise: Sd of the data's noise, in their units; 1 if the squares are divided by variances.
-        n: Number of independent data in the sum, where their noise is unknown.
-        warn: As in `fit`.
-
-    Raises:
-        ValueError: bad argument; not one of noise and n; negative losses, or, with n, a zero; fewer
-            than three finite ones.
-
-    Warns:
-        EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
-
-    Example:
-        >>> import numpy as np
-        >>> import numpyro.distributions as dist
-        >>> from bolfi_liquids import inference
-        >>> prior = inference.Prior({"a": dist.Uniform(0, 2)})
-        >>> a = np.linspace(0, 2, 20)  # what an optimiser tried
-        >>> fit = inference.fit_losses({"a": a}, 1 + 20 * (a - 1.2) ** 2, prior, noise=0.2)
-        >>> draws = fit.sample("quadrature")["posterior"]["a"]
-        >>> print(f"{draws.mean():.2f} {draws.std():.2f}")  # exactly: 1.2 and 0.2 / sqrt(20)
-        1.20 0.04
-    """
-    if (noise is None) == (n is None):
-        raise ValueError(
-            "give exactly one of noise=, the sd of the data's noise, and n=, the number of data in "
-            f"a loss, got noise={noise!r:.100} and n={n!r:.100}"
-        )
-    engine = Bolfi(prior, surrogate="log_likelihood", initial=MIN_LEARN)
-    losses, m = checked_array("loss", loss), len(np.atleast_2d(prior.to_array(theta)))
-    require(losses.shape == (m,), "loss", f"have shape ({m},), one per theta", losses.shape)
-    finite = int(np.isfinite(losses).sum())
-    due = f"hold {MIN_LEARN} finite numbers"
-    require(finite >= MIN_LEARN, "loss", due, finite, cure="simulate more")
-    least = np.nanmin(losses, initial=np.inf)
-    due = f"hold sums of squares, {'positive' if noise is None else 'from 0'}"
-    cure = (
-        "leave such trials out, give noise= for a perfect fit, or give minus a log likelihood, its "
-        'sign changed, to fit(surrogate="log_likelihood")'
-    )
-    fits = least > 0.0 or (least == 0.0 and noise is not None)
-    require(fits, "loss", due, float(least), cure=cure)
-    if noise is not None:
-        sd = checked_number("noise", noise, lambda sd: 0.0 < sd < np.inf, "positive and finite")
-        values = -0.5 * losses / sd**2
-    else:
-        values = -0.5 * checked_integer("n", n) * np.log(losses)
-    engine.tell(theta, values)
-    return engine.fit(warn=warn, stacklevel=3)
 
 
 def _in_rounds(

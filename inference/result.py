@@ -47,6 +47,7 @@ from ._lazy import xr
 from .arguments import check_flag, check_kind, checked_array, checked_integer, require
 from .history import History
 from .interval_error import interval_error
+from .learning import training_mask
 from .notebook_display import Displayed
 from .prior import Prior
 from .sampling.confirmation import Before
@@ -118,17 +119,15 @@ class Fit(Displayed):
 
     Attributes:
         prior, observed: As given.
+        family: Of the surrogate, with its options.
         history: Every simulation, in the order told.
         learned: The surrogate over prior quantiles.
-        training_mask: Which simulations it knows, bool [n].
         settings: How the run was made.
         seconds: Time in the "simulator" and in the "engine" [s].
         before: The posterior of which `Bolfi.confirm` drew last; None where it never did.
         made_by: How it was made; None if not by `fit`, or without a simulator, or if the fit was
             copied, pickled or loaded, for simulators may not be.
         asked: Points that had been asked when it was made.
-        options: Those of the surrogate's family that are numbers, texts, arrays or None; None of a
-            family that is not the engine's own.
 
     Example:
         >>> import numpy as np
@@ -153,18 +152,22 @@ class Fit(Displayed):
 
     prior: Prior
     observed: np.ndarray
+    family: Family
     history: History
     learned: Surrogate
-    training_mask: np.ndarray
     settings: Mapping[str, object]
     seconds: Mapping[str, float]
     before: Before | None = None
     made_by: Recipe | None = None
     asked: int = 0
-    options: Mapping[str, Any] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "made_by": None}
+
+    @cached_property
+    def training_mask(self) -> np.ndarray:
+        """Which simulations the surrogate knows, bool [n]."""
+        return training_mask(self.history)
 
     @property
     def recipe(self) -> Recipe:

@@ -25,7 +25,6 @@ class Quadrature(NamedTuple):
     low: np.ndarray  # [n, d], prior quantiles
     width: np.ndarray  # [n]
     mass: np.ndarray  # [n], sums to one
-    log_evidence: float  # log of the likelihood's prior mean
     log_likelihood: np.ndarray  # [n], at the centres
 
 
@@ -69,10 +68,8 @@ def integrate(target: Target, budget: int = QUICK_BUDGET) -> Quadrature:
             *(np.concatenate([a[kept], b]) for a, b in zip(cells, children, strict=True))
         )
     log_mass = cells.value + d * np.log(cells.width)
-    top = log_mass.max()
-    mass = np.exp(log_mass - top)
-    evidence = float(top + np.log(mass.sum()))
-    return Quadrature(cells.low, cells.width, mass / mass.sum(), evidence, cells.value)
+    mass = np.exp(log_mass - log_mass.max())
+    return Quadrature(cells.low, cells.width, mass / mass.sum(), cells.value)
 
 
 def _first(target: Target) -> _Cells:
