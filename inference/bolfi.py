@@ -331,11 +331,7 @@ class Bolfi(Displayed):
             raise ValueError(failed[-1].text)
 
     def fit(
-        self,
-        seconds: Mapping[str, float] | None = None,
-        *,
-        warn: bool = True,
-        stacklevel: int = 2,
+        self, seconds: Mapping[str, float] | None = None, *, warn: bool = True, stacklevel: int = 2
     ) -> Fit:
         """Fit the surrogate to the simulations told so far.
 

@@ -25,15 +25,7 @@ from .progress import progress_bar
 from .result import MUCH_DOUBT, Fit, Recipe
 from .simulations.bank import Simulation, SimulationBank
 from .simulations.compute import Workers, open_compute
-from .simulations.job import (
-    BATCH,
-    Job,
-    Limit,
-    columns,
-    for_engine,
-    jobs,
-    simulation_seed,
-)
+from .simulations.job import BATCH, Job, Limit, columns, for_engine, jobs, simulation_seed
 from .simulations.program import check_names
 from .simulations.runner import Runner
 from .sobol import start_size

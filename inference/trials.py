@@ -7,14 +7,7 @@ import numpy as np
 import numpyro.distributions as dist
 from numpy.typing import ArrayLike
 
-from .arguments import (
-    check_flag,
-    checked_array,
-    checked_integer,
-    checked_number,
-    is_table,
-    require,
-)
+from .arguments import check_flag, checked_array, checked_integer, checked_number, is_table, require
 from .bolfi import MIN_LEARN, Bolfi
 from .prior import Prior
 from .result import Fit

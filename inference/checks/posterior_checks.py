@@ -164,10 +164,7 @@ def _shape(name: str, ranks: np.ndarray, draws: int) -> str:
 
 
 def sbc(
-    made: Replicates,
-    *,
-    quantities: Mapping[str, Quantity] | None = None,
-    alpha: float = 0.01,
+    made: Replicates, *, quantities: Mapping[str, Quantity] | None = None, alpha: float = 0.01
 ) -> SBC:
     """Simulation-based calibration (Talts et al. 2018; Modrák et al. 2023).
 
