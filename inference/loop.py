@@ -14,9 +14,9 @@ from .arguments import (
     check_flag,
     check_function,
     check_progress,
+    check_runs,
     check_text,
     checked_integer,
-    is_table,
     require,
 )
 from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
@@ -169,8 +169,10 @@ def fit(  # noqa: PLR0913  the one call that most users make
         check_function("simulate", simulate)
     simulator = for_engine(simulate, vectorised, together, time_limit)
     identity = identity or simulator.identity
-    told = _length(checked_prior(prior), earlier)
-    check_names(simulator, prior.names)
+    check_runs("earlier", earlier, 2, 3, 4)
+    names = checked_prior(prior).names
+    told = 0 if earlier is None else len(np.atleast_2d(prior.to_array(earlier[0])))
+    check_names(simulator, names)
     due = f"hold {MOST_SIMULATIONS - budget} simulations at most with budget={budget}"
     require(
         budget + told <= MOST_SIMULATIONS, "earlier", due, told, cure="leave the least useful out"
@@ -316,16 +318,3 @@ def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Si
             f"all {engine.told} simulations of the start design failed{engine.history.last_error}"
         )
     return results
-
-
-def _length(prior: Prior, earlier: Any) -> int:
-    """Simulations in `fit`'s argument `earlier`."""
-    if earlier is None:
-        return 0
-    told = isinstance(earlier, tuple | list) and len(earlier) in (2, 3, 4)
-    due = (
-        "be (theta, signals), (theta, signals, seeds) or (theta, signals, seeds, errors), theta a "
-        "mapping of names to values, or None"
-    )
-    require(told and is_table(earlier[0]), "earlier", due, earlier)
-    return len(np.atleast_2d(prior.to_array(earlier[0])))

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import softmax
 
 from .target import LOG_ZERO, Chains, Length, Target, log_likelihood, somewhere_finite
 
@@ -68,8 +69,7 @@ def integrate(target: Target, budget: int = QUICK_BUDGET) -> Quadrature:
             *(np.concatenate([a[kept], b]) for a, b in zip(cells, children, strict=True))
         )
     log_mass = cells.value + d * np.log(cells.width)
-    mass = np.exp(log_mass - log_mass.max())
-    return Quadrature(cells.low, cells.width, mass / mass.sum(), cells.value)
+    return Quadrature(cells.low, cells.width, softmax(log_mass), cells.value)
 
 
 def _first(target: Target) -> _Cells:

@@ -33,9 +33,13 @@ class TrainingData(NamedTuple):
     u: np.ndarray  # [n, d], prior quantiles
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n]
-    tails: np.ndarray | None  # int [d], see `Prior.tails`
     runs: RunOutcomes  # all, failed ones too
-    prior: Prior | None = None  # of which the quantiles are
+    prior: Prior  # of which the quantiles are
+
+    @property
+    def tails(self) -> np.ndarray | None:
+        """See `Prior.tails`."""
+        return self.prior.tails
 
 
 class Measured(NamedTuple):
