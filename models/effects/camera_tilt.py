@@ -10,13 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from ..effect import Effect
-
-
-def _prior():
-    import numpyro.distributions as dist
-
-    return dist.Normal(0.0, np.radians(1.0))
+from ..effect import Effect, prior_of
 
 
 def _signal(time, angles, coefficient, plane):
@@ -32,7 +26,7 @@ def rolled(name, plane, text):
         acts_in="sensor",
         text=text,
         source="A camera rolled about its optical axis turns the whole picture by the angle",
-        make_prior=_prior,
+        make_prior=prior_of("Normal", 0.0, np.radians(1.0)),
         signal=partial(_signal, plane=plane),
     )
 
