@@ -1,7 +1,7 @@
 """The usual loop: ask, simulate, store, tell."""
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import ExitStack
 from pathlib import Path
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import checks, criticism
 from .arguments import (
     check_flag,
     check_function,
@@ -214,7 +215,10 @@ def fit(  # noqa: PLR0913  the one call that most users make
                 "confirm": confirm,
             }
             engine.recipe = Recipe(
-                simulator, identity, until or budget, own, fit, _check, _criticise
+                *(simulator, identity, until or budget, own, fit),
+                # each room is imported when it is entered
+                check=lambda *given, **how: checks.check_fit(*given, **how),
+                criticise=lambda *given, **how: criticism.criticise_fit(*given, **how),
             )
         made = engine.fit({"simulator": runner.seconds}, warn=False)
         if simulate is None and made.learned.unreached:  # a table of losses, not of outputs
@@ -237,18 +241,6 @@ def _check_learnable(engine: Bolfi, runner: Runner) -> None:
             f"{MIN_LEARN} are needed{engine.history.last_error}. {runner.bank.where}; mend the "
             "cause, or raise budget, and repeat the call to go on from there"
         )
-
-
-def _check(made: Fit, n: int, **how: Any) -> Any:
-    from .checks import check_fit
-
-    return check_fit(made, n, **how)
-
-
-def _criticise(made: Fit, extensions: Mapping[str, Any], **how: Any) -> Any:
-    from .criticism import criticise_fit
-
-    return criticise_fit(made, extensions, **how)
 
 
 def _in_rounds(

@@ -26,7 +26,7 @@ from .surrogates.base import Family
 from .surrogates.families import FAMILIES, option_names, resolve
 
 SAME = 1e-3  # relative, up to which what is learned again is what was learned
-MADE = "fit.json"
+MADE, OPTION = "fit.json", "option_"
 SCALARS = bool, int, float, str, type(None)
 OF_HISTORY = "theta", "seeds", "rounds", "discrepancy"
 # of a file that is none of ours, or damaged
@@ -43,7 +43,7 @@ def write_fit(path: str | Path, fit: Any) -> Path:
     options = vars(fit.family) if own else {}
     scalars = {name: value for name, value in options.items() if isinstance(value, SCALARS)}
     arrays = {
-        f"option_{name}": np.asarray(value)
+        OPTION + name: np.asarray(value)
         for name, value in options.items()
         if name not in scalars and _is_array(value)
     }
@@ -177,12 +177,6 @@ def _checked_prior(made: Mapping[str, Any], prior: Prior | None) -> Prior:
     )
 
 
-def _stored_options(made: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    start = "option_"
-    held = {n.removeprefix(start): v for n, v in arrays.items() if n.startswith(start)}
-    return {**made["options"], **held}
-
-
 def _family(
     made: Mapping[str, Any],
     arrays: Mapping[str, np.ndarray],
@@ -195,7 +189,8 @@ def _family(
         name = settings["surrogate"]
         cure = "give load(path, surrogate=...) the one with which the fit was made"
         require(made["own_family"], "surrogate", f"be {name!r}", surrogate, cure=cure)
-        stored = _stored_options(made, arrays)
+        held = {n.removeprefix(OPTION): v for n, v in arrays.items() if n.startswith(OPTION)}
+        stored = {**made["options"], **held}
         for missing in sorted(option_names(name) - {*stored, *given}):
             cure = f"give load(path, {missing}=...) what the fit was made with"
             require(False, missing, f"be {settings[missing]}", None, cure=cure)
