@@ -24,11 +24,7 @@ class Cut(NamedTuple):
 
 
 def trim(
-    recording: str | Path,
-    *,
-    start: float | None = None,
-    stop: float | None = None,
-    out: str | Path,
+    recording: str | Path, *, start: float | None = None, stop: float | None = None, out: str | Path
 ) -> Recording:
     """Cut a recording, and write what stays to a new file.
 

@@ -99,10 +99,7 @@ def shown(draw: "Callable[[Canvas], Panels]", axes: "Canvas") -> np.ndarray:
 
 
 def panels(
-    axes: "Canvas",
-    shape: tuple[int, int],
-    size: tuple[float, float],
-    **options: Any,
+    axes: "Canvas", shape: tuple[int, int], size: tuple[float, float], **options: Any
 ) -> Panels:
     """The axes that a caller gives, or those of an empty figure.
 

@@ -392,8 +392,7 @@ class Limits(RigSection, frozen=True):
         ),
     ] = 20.0
     tracking_error: Annotated[
-        float,
-        Within(0.001, 0.02, "m", "the arm follows within a few mm, or something holds it"),
+        float, Within(0.001, 0.02, "m", "the arm follows within a few mm, or something holds it")
     ] = 0.01
     latency: Annotated[
         float, Within(0.008, 0.5, "s", "no controller acts within less than its own period")

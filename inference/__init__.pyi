@@ -15,7 +15,6 @@ from .checks import tarp as tarp
 from .emulation import Emulation as Emulation
 from .emulation import emulate as emulate
 from .loop import fit as fit
-from .loop import fit_losses as fit_losses
 from .pipelines import FitPipeline as FitPipeline
 from .pipelines import shared_design as shared_design
 from .prior import Prior as Prior
@@ -30,5 +29,6 @@ from .surrogates.noise.by_mean import relative as relative
 from .surrogates.signal import SignalFamily as SignalFamily
 from .surrogates.squared_difference import squared_difference as squared_difference
 from .surrogates.warnings import EmulatorWarning as EmulatorWarning
+from .trials import fit_losses as fit_losses
 from .trials import from_trials as from_trials
 from .until import Until as Until

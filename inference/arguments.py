@@ -230,6 +230,16 @@ def check_choice(name: str, value: object, choices: tuple[str | None, ...]) -> N
     require(fits, name, f"be one of {choices}", value)
 
 
+def check_runs(name: str, runs: Any, *lengths: int) -> None:
+    """Raise ValueError unless `runs` is None, or the first of theta, signals, seeds and errors, so
+    many of them."""
+    held = isinstance(runs, tuple | list) and len(runs) in lengths and is_table(runs[0])
+    parts = "theta", "signals", "seeds", "errors"
+    forms = " or ".join(f"({', '.join(parts[:length])})" for length in lengths)
+    due = f"be {forms}, theta a mapping of names to values, or None"
+    require(runs is None or held, name, due, runs)
+
+
 def is_table(value: object) -> bool:
     """Whether `value` has columns by name: a mapping, a data frame, a dataset."""
     return hasattr(value, "keys") and hasattr(value, "__getitem__")

@@ -16,7 +16,7 @@ from .acquisition.rules import chosen, resolve_acquisition
 from .arguments import check_flag, checked_integer, checked_mapping, require
 from .describe import describe
 from .history import UNKNOWN, History, told_errors, told_seeds, told_signals
-from .learning import key_words, learned_from, training_data, training_mask
+from .learning import key_words, learned_from, training_data
 from .notebook_display import Displayed
 from .prior import Prior, check_support, checked_prior
 from .result import Fit, Recipe
@@ -25,7 +25,7 @@ from .simulations.failures import Failure, FailureKind, not_finite
 from .simulations.job import BATCH
 from .sobol import sobol, start_size
 from .surrogates.base import Acquisition, Family
-from .surrogates.families import checked_surrogate, plain_options, resolve
+from .surrogates.families import checked_surrogate, resolve
 from .surrogates.warnings import complain
 from .types import Theta
 
@@ -331,11 +331,7 @@ class Bolfi(Displayed):
             raise ValueError(failed[-1].text)
 
     def fit(
-        self,
-        seconds: Mapping[str, float] | None = None,
-        *,
-        warn: bool = True,
-        stacklevel: int = 2,
+        self, seconds: Mapping[str, float] | None = None, *, warn: bool = True, stacklevel: int = 2
     ) -> Fit:
         """Fit the surrogate to the simulations told so far.
 
@@ -366,15 +362,14 @@ class Bolfi(Displayed):
         made = Fit(
             prior=self.prior,
             observed=self.observed,
+            family=self.family,
             history=self.history,
             learned=fitted,
-            training_mask=training_mask(self.history),
             settings=self.settings,
             seconds={"simulator": 0.0, **measured, "engine": self._seconds},
             before=self._before,
             made_by=self.recipe,
             asked=self.asked,
-            options=plain_options(self.family),
         )
         if warn:
             complain(made.warnings, stacklevel + 1)

@@ -27,7 +27,7 @@ def training_data(view: Any, history: History, prior: Prior) -> TrainingData:
     known = view, history.u[good], history.features[good], history.discrepancy[good]
     # runs that blew up did not succeed
     succeeded = history.succeeded & ~is_outlier(history.discrepancy)
-    return TrainingData(*known, prior.tails, RunOutcomes(history.u, succeeded), prior)
+    return TrainingData(*known, RunOutcomes(history.u, succeeded), prior)
 
 
 def key_words(seed: int, asked: int) -> np.ndarray:

@@ -1,7 +1,7 @@
 """The usual loop: ask, simulate, store, tell."""
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import ExitStack
 from pathlib import Path
@@ -10,15 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import checks, criticism
 from .arguments import (
     check_flag,
     check_function,
     check_progress,
+    check_runs,
     check_text,
-    checked_array,
     checked_integer,
-    checked_number,
-    is_table,
     require,
 )
 from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
@@ -27,20 +26,13 @@ from .progress import progress_bar
 from .result import MUCH_DOUBT, Fit, Recipe
 from .simulations.bank import Simulation, SimulationBank
 from .simulations.compute import Workers, open_compute
-from .simulations.job import (
-    BATCH,
-    Job,
-    Limit,
-    columns,
-    for_engine,
-    jobs,
-    simulation_seed,
-)
+from .simulations.job import BATCH, Job, Limit, columns, for_engine, jobs, simulation_seed
+from .simulations.program import check_names
 from .simulations.runner import Runner
 from .sobol import start_size
 from .surrogates.base import Acquisition, Family
 from .surrogates.warnings import complain
-from .types import Simulator, SingleSimulator, Theta
+from .types import Simulator, SingleSimulator
 from .until import Until, checked_budget, enough
 
 
@@ -178,7 +170,10 @@ def fit(  # noqa: PLR0913  the one call that most users make
         check_function("simulate", simulate)
     simulator = for_engine(simulate, vectorised, together, time_limit)
     identity = identity or simulator.identity
-    told = _length(checked_prior(prior), earlier)
+    check_runs("earlier", earlier, 2, 3, 4)
+    names = checked_prior(prior).names
+    told = 0 if earlier is None else len(np.atleast_2d(prior.to_array(earlier[0])))
+    check_names(simulator, names)
     due = f"hold {MOST_SIMULATIONS - budget} simulations at most with budget={budget}"
     require(
         budget + told <= MOST_SIMULATIONS, "earlier", due, told, cure="leave the least useful out"
@@ -208,9 +203,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         )
         schedule = _in_rounds if in_rounds else _in_flight
         finished = schedule(engine, runner, budget, batch, enough(engine, until))
-        seconds = 0.0
-        for simulation in finished:
-            seconds += simulation.seconds
+        for _ in finished:
             advance(1)
         _check_learnable(engine, runner)
         budget = engine.told - told
@@ -222,16 +215,18 @@ def fit(  # noqa: PLR0913  the one call that most users make
                 "confirm": confirm,
             }
             engine.recipe = Recipe(
-                simulator, identity, until or budget, own, fit, _check, _criticise
+                *(simulator, identity, until or budget, own, fit),
+                # each room is imported when it is entered
+                check=lambda *given, **how: checks.check_fit(*given, **how),
+                criticise=lambda *given, **how: criticism.criticise_fit(*given, **how),
             )
-        made = engine.fit({"simulator": seconds}, warn=False)
+        made = engine.fit({"simulator": runner.seconds}, warn=False)
         if simulate is None and made.learned.unreached:  # a table of losses, not of outputs
             raise ValueError(made.learned.unreached[0])
         for _ in range(_confirmations(engine, budget, confirm)):
-            for simulation in _confirmation(engine, made, runner, confirm):
-                seconds += simulation.seconds
+            for _ in _confirmation(engine, made, runner, confirm):
                 advance(1)
-            made = engine.fit({"simulator": seconds}, warn=False)
+            made = engine.fit({"simulator": runner.seconds}, warn=False)
             if made.confirmed and made.doubt < MUCH_DOUBT:
                 break
     if warn:
@@ -246,88 +241,6 @@ def _check_learnable(engine: Bolfi, runner: Runner) -> None:
             f"{MIN_LEARN} are needed{engine.history.last_error}. {runner.bank.where}; mend the "
             "cause, or raise budget, and repeat the call to go on from there"
         )
-
-
-def _check(made: Fit, n: int, **how: Any) -> Any:
-    from .checks import check_fit
-
-    return check_fit(made, n, **how)
-
-
-def _criticise(made: Fit, extensions: Mapping[str, Any], **how: Any) -> Any:
-    from .criticism import criticise_fit
-
-    return criticise_fit(made, extensions, **how)
-
-
-def fit_losses(
-    theta: Theta,
-    loss: ArrayLike,
-    prior: Prior,
-    *,
-    noise: float | None = None,
-    n: int | None = None,
-    warn: bool = True,
-) -> Fit:
-    """Infer parameters from losses that are sums of squares, as an optimiser leaves them.
-
-    With a known noise the log likelihood is -loss / (2 noise^2); with an unknown one, of prior
-    1 / noise, it is -(n / 2) log(loss). Any other loss is a log likelihood by your own formula:
-    `fit(None, prior, surrogate="log_likelihood", budget=0, earlier=(theta, values))`.
-
-    Args:
-        theta: Name -> [m], in the prior's support; it may be a data frame.
-        loss: Sum over n data of (datum - model)^2 [m]; NaN is a failed trial, and inf is
-            impossible.
-        prior: The parameters and their priors, such as the ranges of the search.
-        noise: Sd of the data's noise, in their units; 1 if the squares are divided by variances.
-        n: Number of independent data in the sum, where their noise is unknown.
-        warn: As in `fit`.
-
-    Raises:
-        ValueError: bad argument; not one of noise and n; negative losses, or, with n, a zero; fewer
-            than three finite ones.
-
-    Warns:
-        EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
-
-    Example:
-        >>> import numpy as np
-        >>> import numpyro.distributions as dist
-        >>> from bolfi_liquids import inference
-        >>> prior = inference.Prior({"a": dist.Uniform(0, 2)})
-        >>> a = np.linspace(0, 2, 20)  # what an optimiser tried
-        >>> fit = inference.fit_losses({"a": a}, 1 + 20 * (a - 1.2) ** 2, prior, noise=0.2)
-        >>> draws = fit.sample("quadrature")["posterior"]["a"]
-        >>> print(f"{draws.mean():.2f} {draws.std():.2f}")  # exactly: 1.2 and 0.2 / sqrt(20)
-        1.20 0.04
-    """
-    if (noise is None) == (n is None):
-        raise ValueError(
-            "give exactly one of noise=, the sd of the data's noise, and n=, the number of data in "
-            f"a loss, got noise={noise!r:.100} and n={n!r:.100}"
-        )
-    engine = Bolfi(prior, surrogate="log_likelihood", initial=MIN_LEARN)
-    losses, m = checked_array("loss", loss), len(np.atleast_2d(prior.to_array(theta)))
-    require(losses.shape == (m,), "loss", f"have shape ({m},), one per theta", losses.shape)
-    finite = int(np.isfinite(losses).sum())
-    due = f"hold {MIN_LEARN} finite numbers"
-    require(finite >= MIN_LEARN, "loss", due, finite, cure="simulate more")
-    least = np.nanmin(losses, initial=np.inf)
-    due = f"hold sums of squares, {'positive' if noise is None else 'from 0'}"
-    cure = (
-        "leave such trials out, give noise= for a perfect fit, or give minus a log likelihood, its "
-        'sign changed, to fit(surrogate="log_likelihood")'
-    )
-    fits = least > 0.0 or (least == 0.0 and noise is not None)
-    require(fits, "loss", due, float(least), cure=cure)
-    if noise is not None:
-        sd = checked_number("noise", noise, lambda sd: 0.0 < sd < np.inf, "positive and finite")
-        values = -0.5 * losses / sd**2
-    else:
-        values = -0.5 * checked_integer("n", n) * np.log(losses)
-    engine.tell(theta, values)
-    return engine.fit(warn=warn, stacklevel=3)
 
 
 def _in_rounds(
@@ -397,16 +310,3 @@ def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Si
             f"all {engine.told} simulations of the start design failed{engine.history.last_error}"
         )
     return results
-
-
-def _length(prior: Prior, earlier: Any) -> int:
-    """Simulations in `fit`'s argument `earlier`."""
-    if earlier is None:
-        return 0
-    told = isinstance(earlier, tuple | list) and len(earlier) in (2, 3, 4)
-    due = (
-        "be (theta, signals), (theta, signals, seeds) or (theta, signals, seeds, errors), theta a "
-        "mapping of names to values, or None"
-    )
-    require(told and is_table(earlier[0]), "earlier", due, earlier)
-    return len(np.atleast_2d(prior.to_array(earlier[0])))

@@ -28,6 +28,7 @@ from .progress import progress_bar
 from .simulations.bank import SimulationBank
 from .simulations.compute import Workers, open_compute
 from .simulations.job import BATCH, for_engine, jobs, simulation_seed, stacked
+from .simulations.program import check_names
 from .simulations.runner import run_missing
 from .sobol import sobol
 from .surrogates.families import resolve
@@ -83,7 +84,9 @@ class FitPipeline:
         check_sampling(self.sampling)
         check_flag("options['vectorised']", options.get("vectorised", True))
         called = {name: options.pop(name) for name in CALLING if name in options}
-        object.__setattr__(self, "simulate", for_engine(self.simulate, **called))
+        simulator = for_engine(self.simulate, **called)
+        check_names(simulator, self.prior.names)
+        object.__setattr__(self, "simulate", simulator)
         object.__setattr__(self, "options", options)
 
     def __call__(self, observed: np.ndarray, seed: int) -> "tuple[xr.DataTree, LogDensity]":

@@ -1,40 +1,10 @@
-"""The result of a run: posterior, best hypothesis, surrogate, simulations.
-
-`Fit.sample` returns a tree in ArviZ's schema, with these groups.
-
-posterior: draws [chain, draw] in the parameters' own units. Attributes of each: `prior`, `units`
-(where the prior has them), `rhat`, `ess_bulk`, `ess_tail`, and Monte Carlo standard errors of mean
-and 5 and 95 % quantiles, `mcse_mean`, `mcse_q05`, `mcse_q95`. Of the group: `status` ("converged",
-or what is wrong), `rhat_max`, `ess_bulk_min`, `ess_tail_min`, `divergences`, `draws_made` (per
-chain, before thinning); for one or two parameters `quadrature_total_variation` (of 16 equally
-probable bins; independent draws as many as the effective ones stay below
-`quadrature_total_variation_limit`); `log_evidence` and `log_evidence_error`, see `Fit.evidence`.
-
-sample_stats: `lp`, log density over Phi^-1(u) of the prior quantiles u, and what the sampler
-records. prior: as many draws. observed_data: `signal`, and where samples of it are missing or
-averaged, or summarised, also the `values` that are compared. posterior_predictive,
-prior_predictive: what the surrogate predicts at each draw, of the same names, or the "discrepancy"
-or "log_likelihood" of a run. log_prior: log density of each parameter in its own units.
-
-log_likelihood: log density of each observed value given all others, which leave-one-out
-cross-validation needs (Buerkner, Gabry and Vehtari 2021): "signal" or "values", or "observed" where
-all that was observed is one datum. These densities do not add up to the likelihood where values
-hang together, by correlated noise, noise of unknown size or the emulator's error; where that shows
-in the draws, "dependence" is what they lack, so that the group's sum is the log likelihood, as
-`az.psense_summary` wants it. `az.loo` and `az.compare` then need `var_name="signal"`.
-
-constant_data: the surrogate's constants. emulator_checks: the surrogate's own checks for each
-simulation, NaN where it learned nothing from one, and the fit's complaints in the attribute
-`warnings`. simulations: as `Fit.simulations`. The root's attributes hold how the run was made, the
-seconds it took, and `fit_status`.
-"""
+"""The result of a run: posterior, best hypothesis, surrogate, simulations."""
 
 import time
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -47,11 +17,13 @@ from ._lazy import xr
 from .arguments import check_flag, check_kind, checked_array, checked_integer, require
 from .history import History
 from .interval_error import interval_error
+from .learning import training_mask
 from .notebook_display import Displayed
+from .posterior_tree import tree_of
 from .prior import Prior
 from .sampling.confirmation import Before
-from .sampling.convergence import SamplingWarning, diagnose
-from .sampling.draw import SAMPLERS, Sampled, draw_posterior
+from .sampling.convergence import SamplingWarning
+from .sampling.draw import SAMPLERS, draw_posterior
 from .sampling.importance import (
     LEAST,
     Evidence,
@@ -77,8 +49,6 @@ LEAST_EFFECTIVE = 32.0  # points of a population that stand for a posterior
 MUCH_DOUBT = 1.5  # see `Fit.doubt`: beyond it more is simulated, and a fit warns
 MOST_MORE = 1000  # runs, of which `Fit.interval_error` tells
 TEN_MORE = 10  # runs, of which a printed fit says what they would bring
-NO_DEPENDENCE = 0.1  # nats, sd over draws, too small to matter to powers of the likelihood
-SAMPLE_DIMS = ("chain", "draw")
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
 
 
@@ -118,17 +88,15 @@ class Fit(Displayed):
 
     Attributes:
         prior, observed: As given.
+        family: Of the surrogate, with its options.
         history: Every simulation, in the order told.
         learned: The surrogate over prior quantiles.
-        training_mask: Which simulations it knows, bool [n].
         settings: How the run was made.
         seconds: Time in the "simulator" and in the "engine" [s].
         before: The posterior of which `Bolfi.confirm` drew last; None where it never did.
         made_by: How it was made; None if not by `fit`, or without a simulator, or if the fit was
             copied, pickled or loaded, for simulators may not be.
         asked: Points that had been asked when it was made.
-        options: Those of the surrogate's family that are numbers, texts, arrays or None; None of a
-            family that is not the engine's own.
 
     Example:
         >>> import numpy as np
@@ -153,18 +121,22 @@ class Fit(Displayed):
 
     prior: Prior
     observed: np.ndarray
+    family: Family
     history: History
     learned: Surrogate
-    training_mask: np.ndarray
     settings: Mapping[str, object]
     seconds: Mapping[str, float]
     before: Before | None = None
     made_by: Recipe | None = None
     asked: int = 0
-    options: Mapping[str, Any] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "made_by": None}
+
+    @cached_property
+    def training_mask(self) -> np.ndarray:
+        """Which simulations the surrogate knows, bool [n]."""
+        return training_mask(self.history)
 
     @property
     def recipe(self) -> Recipe:
@@ -457,7 +429,7 @@ class Fit(Displayed):
 
         Returns:
             DataTree in ArviZ's schema, draws in the parameters' own units, with R-hat, effective
-            sample sizes and Monte Carlo errors; `inference.result` describes its groups and
+            sample sizes and Monte Carlo errors; `inference.posterior_tree` describes groups and
             attributes. Opens in ArviZ 0.23 and 1.x, also from `to_netcdf`.
 
         Raises:
@@ -487,7 +459,7 @@ class Fit(Displayed):
             "fit_status": self.status,
             **{f"seconds_{part}": spent for part, spent in seconds.items()},
         }
-        return _tree(self, made, seed, attributes)
+        return tree_of(self, made, seed, attributes)
 
     @in_float64
     def sobol(self, n: int = 2048, *, seed: int = 0) -> "xr.Dataset":
@@ -613,91 +585,3 @@ class Fit(Displayed):
             ValueError: the fit has no `recipe`, its noise is not known, or an argument is bad.
         """
         return self.recipe.criticise(self, extensions, **how)
-
-
-def _tree(fit: Fit, made: Sampled, seed: int, attributes: Mapping[str, object]) -> "xr.DataTree":
-    """The tree that `Fit.sample` returns.
-
-    Args:
-        seed: Of the prior's draws, as many as each chain's, and of the predictions.
-        attributes: Of the root.
-    """
-    import arviz_base
-
-    prior, chains, length = fit.prior, made.chains, made.chains.u.shape[1]
-    posterior = prior.from_unit(chains.u)
-    rng = np.random.default_rng([seed, *b"prior"])
-    u_before = rng.random((length, len(prior)))
-    before = {name: values[None] for name, values in prior.from_unit(u_before).items()}
-    generators = (np.random.default_rng([seed, *kind]) for kind in (b"predictive", b"before"))
-    shapes = (chains.u.shape[:2], (1, length))
-    drawn = chains.u.reshape(-1, len(prior)), u_before
-    predicted, expected = (
-        _shaped(fit.learned.predictive(generator, u), shape)
-        for generator, u, shape in zip(generators, drawn, shapes, strict=True)
-    )
-    log_prior = prior.log_probs({name: values.ravel() for name, values in posterior.items()})
-    constants = {name: np.asarray(value) for name, value in fit.learned.constants().items()}
-    groups = {
-        "posterior": posterior,
-        "sample_stats": dict(chains.stats),
-        "prior": before,
-        "log_prior": _shaped(log_prior, shapes[0]),
-        "log_likelihood": _shaped(_log_likelihoods(fit, drawn[0]), shapes[0]),
-        "posterior_predictive": predicted,
-        "prior_predictive": expected,
-        "observed_data": {"signal": np.atleast_1d(fit.observed), **fit.learned.compared},
-        "constant_data": constants,
-    }
-    tree = arviz_base.from_dict({name: held for name, held in groups.items() if held})
-    tree["simulations"] = xr.DataTree(fit.simulations)
-    for group in ("posterior", "prior", "simulations"):
-        for name, described in prior.describe().items():
-            tree[group][name].attrs.update(described)
-    diagnosed = {name: diagnose(draws) for name, draws in posterior.items()}
-    for name, measures in diagnosed.items():
-        tree["posterior"][name].attrs.update(measures)
-    tree["posterior"].attrs.update(
-        rhat_max=max(measures["rhat"] for measures in diagnosed.values()),
-        ess_bulk_min=min(measures["ess_bulk"] for measures in diagnosed.values()),
-        ess_tail_min=min(measures["ess_tail"] for measures in diagnosed.values()),
-        divergences=int(np.sum(chains.stats.get("diverging", 0))),
-        status=made.status,
-        draws_made=made.steps,
-        log_evidence=fit.evidence.log,
-        log_evidence_error=fit.evidence.error,
-        **made.checks,
-    )
-    tree["emulator_checks"] = xr.DataTree(_emulator_checks(fit))
-    for group in tree.children.values():
-        sampled = [name for name in SAMPLE_DIMS if name in group.dims]
-        group.attrs.pop("sample_dims", None)
-        if sampled:
-            group.attrs["sample_dims"] = sampled
-    tree.attrs.update(attributes, version=version("bolfi-liquids"))
-    return tree
-
-
-def _shaped(groups: Mapping[str, np.ndarray], shape: tuple[int, int]) -> dict[str, np.ndarray]:
-    """Rows [n, ...] as chains and draws [*shape, ...]."""
-    return {name: np.reshape(of, (*shape, *np.shape(of)[1:])) for name, of in groups.items()}
-
-
-def _log_likelihoods(fit: Fit, u: np.ndarray) -> dict[str, np.ndarray]:
-    """Log densities of the observed values at u [n, d], and what their sum lacks."""
-    terms = fit.learned.pointwise(u)
-    total = log_likelihood(fit._target, u) + fit.learned.log_constant
-    rest = total - sum(of.reshape(len(u), -1).sum(1) for of in terms.values())
-    together = rest.std() > NO_DEPENDENCE
-    return {**terms, **({"dependence": rest} if together else {})}
-
-
-def _emulator_checks(fit: Fit) -> "xr.Dataset":
-    """The surrogate's checks with a row for each simulation."""
-    columns = {}
-    for name, values in fit.learned.checks().items():
-        of_all = np.full((len(fit.training_mask), *values.shape[1:]), np.nan)
-        of_all[fit.training_mask] = values
-        axes = (f"{name}_dim_{i}" for i in range(values.ndim - 1))
-        columns[name] = (["simulation", *axes], of_all)
-    return xr.Dataset(columns, attrs={"warnings": "\n".join(fit.warnings)})

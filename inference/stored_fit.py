@@ -13,20 +13,20 @@ from typing import Any
 
 import numpy as np
 
-from .arguments import check_kind, checked_mapping, require
+from .arguments import check_kind, checked_mapping, is_table, require
 from .describe import describe
 from .distributions import from_table, to_table
 from .engine_version import ENGINE_VERSION
 from .history import History
-from .learning import key_words, learned_from, training_data, training_mask
+from .learning import key_words, learned_from, training_data
 from .prior import Prior
 from .sampling.confirmation import Before
 from .simulations.failures import failure_columns, failure_of
 from .surrogates.base import Family
-from .surrogates.families import option_names, resolve
+from .surrogates.families import FAMILIES, option_names, resolve
 
 SAME = 1e-3  # relative, up to which what is learned again is what was learned
-MADE = "fit.json"
+MADE, OPTION = "fit.json", "option_"
 SCALARS = bool, int, float, str, type(None)
 OF_HISTORY = "theta", "seeds", "rounds", "discrepancy"
 # of a file that is none of ours, or damaged
@@ -39,9 +39,14 @@ UNREADABLE = (
 def write_fit(path: str | Path, fit: Any) -> Path:
     """See `Fit.save`; `fit` is one."""
     check_kind("path", path, str | Path)
-    history, before, options = fit.history, fit.before, fit.options or {}
+    history, before, own = fit.history, fit.before, type(fit.family) in FAMILIES.values()
+    options = vars(fit.family) if own else {}
     scalars = {name: value for name, value in options.items() if isinstance(value, SCALARS)}
-    arrays = {f"option_{n}": np.asarray(v) for n, v in options.items() if n not in scalars}
+    arrays = {
+        OPTION + name: np.asarray(value)
+        for name, value in options.items()
+        if name not in scalars and _is_array(value)
+    }
     arrays |= {name: getattr(history, name) for name in OF_HISTORY}
     outputs = [np.zeros(0) if one is None else np.asarray(one) for one in history.outputs]
     arrays["outputs"] = np.concatenate([one.ravel() for one in outputs])
@@ -51,7 +56,7 @@ def write_fit(path: str | Path, fit: Any) -> Path:
         "prior": _written(fit.prior, history),
         "described_prior": fit.prior.describe(),
         "units": fit.prior.units,
-        "own_family": fit.options is not None,
+        "own_family": own,
         "options": scalars,
         "settings": dict(fit.settings),
         "seconds": dict(fit.seconds),
@@ -97,16 +102,22 @@ def read_fit(
     fields = {
         "prior": prior,
         "observed": observed,
+        "family": family,
         "history": history,
         "learned": learned(history, made["asked"]),
-        "training_mask": training_mask(history),
         "settings": settings,
         "seconds": made["seconds"],
         "before": before,
         "asked": made["asked"],
-        "options": _stored_options(made, arrays) if made["own_family"] else None,
     }
     return fields, arrays
+
+
+def _is_array(value: Any) -> bool:
+    """Whether an option is numbers; a named tuple is a rule, and a table runs of a simulator."""
+    listed = isinstance(value, list | tuple) and not hasattr(value, "_fields")
+    listed = listed and not any(map(is_table, value))
+    return (listed or hasattr(value, "__array__")) and np.asarray(value).dtype.kind in "biuf"
 
 
 def check_same(path: str | Path, arrays: Mapping[str, np.ndarray], fit: Any) -> None:
@@ -166,12 +177,6 @@ def _checked_prior(made: Mapping[str, Any], prior: Prior | None) -> Prior:
     )
 
 
-def _stored_options(made: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    start = "option_"
-    held = {n.removeprefix(start): v for n, v in arrays.items() if n.startswith(start)}
-    return {**made["options"], **held}
-
-
 def _family(
     made: Mapping[str, Any],
     arrays: Mapping[str, np.ndarray],
@@ -184,7 +189,8 @@ def _family(
         name = settings["surrogate"]
         cure = "give load(path, surrogate=...) the one with which the fit was made"
         require(made["own_family"], "surrogate", f"be {name!r}", surrogate, cure=cure)
-        stored = _stored_options(made, arrays)
+        held = {n.removeprefix(OPTION): v for n, v in arrays.items() if n.startswith(OPTION)}
+        stored = {**made["options"], **held}
         for missing in sorted(option_names(name) - {*stored, *given}):
             cure = f"give load(path, {missing}=...) what the fit was made with"
             require(False, missing, f"be {settings[missing]}", None, cure=cure)

@@ -1,17 +1,16 @@
-"""A posterior from the trials that an optimiser leaves."""
+"""A posterior from losses, or from the trials that an optimiser leaves."""
 
 from os import PathLike
 from typing import Any
 
 import numpy as np
 import numpyro.distributions as dist
+from numpy.typing import ArrayLike
 
-from .arguments import check_flag, checked_array, is_table, require
+from .arguments import check_flag, checked_array, checked_integer, checked_number, is_table, require
 from .bolfi import MIN_LEARN, Bolfi
-from .loop import fit_losses
 from .prior import Prior
 from .result import Fit
-from .surrogates.warnings import complain
 from .types import Theta
 
 OTHERWISE = (
@@ -19,6 +18,51 @@ OTHERWISE = (
     "take the trials of one, as a data frame with a column `loss`"
 )
 """The cure where the search space of a study is no prior."""
+
+
+def fit_losses(
+    theta: Theta,
+    loss: ArrayLike,
+    prior: Prior,
+    *,
+    noise: float | None = None,
+    n: int | None = None,
+    warn: bool = True,
+) -> Fit:
+    """Infer parameters from losses that are sums of squares, as an optimiser leaves them.
+
+    With a known noise the log likelihood is -loss / (2 noise^2); with an unknown one, of prior
+    1 / noise, it is -(n / 2) log(loss). Any other loss is a log likelihood by your own formula:
+    `fit(None, prior, surrogate="log_likelihood", budget=0, earlier=(theta, values))`.
+
+    Args:
+        theta: Name -> [m], in the prior's support; it may be a data frame.
+        loss: Sum over n data of (datum - model)^2 [m]; NaN is a failed trial, and inf is
+            impossible.
+        prior: The parameters and their priors, such as the ranges of the search.
+        noise: Sd of the data's noise, in their units; 1 if the squares are divided by variances.
+        n: Number of independent data in the sum, where their noise is unknown.
+        warn: As in `fit`.
+
+    Raises:
+        ValueError: bad argument; not one of noise and n; negative losses, or, with n, a zero; fewer
+            than three finite ones.
+
+    Warns:
+        EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
+
+    Example:
+        >>> import numpy as np
+        >>> import numpyro.distributions as dist
+        >>> from bolfi_liquids import inference
+        >>> prior = inference.Prior({"a": dist.Uniform(0, 2)})
+        >>> a = np.linspace(0, 2, 20)  # what an optimiser tried
+        >>> fit = inference.fit_losses({"a": a}, 1 + 20 * (a - 1.2) ** 2, prior, noise=0.2)
+        >>> draws = fit.sample("quadrature")["posterior"]["a"]
+        >>> print(f"{draws.mean():.2f} {draws.std():.2f}")  # exactly: 1.2 and 0.2 / sqrt(20)
+        1.20 0.04
+    """
+    return _fit(prior, theta, _log_likelihoods(loss, noise, n), warn)
 
 
 def from_trials(
@@ -41,7 +85,7 @@ def from_trials(
             trials are failed runs. Its pruned and unfinished ones, whose loss is not known, are
             left out. Where it maximises, losses are its values with their signs changed.
         noise, n: Of losses that are sums of squares, see `fit_losses`.
-        log_likelihood: Whether losses are negative log likelihoods, in place of `noise` and `n`.
+        log_likelihood: Whether losses are minus a log likelihood, in place of `noise` and `n`.
         warn: As in `fit`.
 
     Raises:
@@ -52,24 +96,49 @@ def from_trials(
     Warns:
         EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
     """
-    check_flag("warn", warn)
-    check_flag("log_likelihood", log_likelihood)
     is_study = hasattr(trials, "trials") and hasattr(trials, "directions")
     theta, loss = _of_study(trials) if is_study else _of_table(trials, prior)
     prior = _search_ranges(trials) if prior is None else prior
+    return _fit(prior, theta, _log_likelihoods(loss, noise, n, log_likelihood), warn)
+
+
+def _log_likelihoods(
+    loss: ArrayLike, noise: float | None, n: int | None, log_likelihood: bool = False
+) -> np.ndarray:
+    check_flag("log_likelihood", log_likelihood)
     if (noise is not None) + (n is not None) + log_likelihood != 1:
         raise ValueError(
-            "give exactly one of noise=, n= and log_likelihood=True, which say what a loss is, got "
-            f"noise={noise!r:.100}, n={n!r:.100} and log_likelihood={log_likelihood}"
+            "give exactly one of noise=, the sd of the data's noise, n=, the number of data in a "
+            "loss, and, to from_trials, log_likelihood=True, got "
+            f"log_likelihood={log_likelihood}, noise={noise!r:.100} and n={n!r:.100}"
         )
+    losses = checked_array("loss", loss)
     if log_likelihood:
-        engine = Bolfi(prior, surrogate="log_likelihood", initial=MIN_LEARN)
-        engine.tell(theta, -checked_array("loss", loss))
-        return engine.fit(warn=warn, stacklevel=3)
-    made = fit_losses(theta, loss, prior, noise=noise, n=n, warn=False)
-    if warn:
-        complain(made.warnings, stacklevel=3)
-    return made
+        return -losses
+    finite = int(np.isfinite(losses).sum())
+    due = f"hold {MIN_LEARN} finite numbers"
+    require(finite >= MIN_LEARN, "loss", due, finite, cure="simulate more")
+    least = np.nanmin(losses)
+    due = f"hold sums of squares, {'positive' if noise is None else 'from 0'}"
+    cure = (
+        "leave such trials out, give noise= for a perfect fit, or give minus a log likelihood, its "
+        'sign changed, to fit(surrogate="log_likelihood")'
+    )
+    fits = least > 0.0 or (least == 0.0 and noise is not None)
+    require(fits, "loss", due, float(least), cure=cure)
+    if noise is None:
+        return -0.5 * checked_integer("n", n) * np.log(losses)
+    sd = checked_number("noise", noise, lambda sd: 0.0 < sd < np.inf, "positive and finite")
+    return -0.5 * losses / sd**2
+
+
+def _fit(prior: Prior, theta: Theta, values: np.ndarray, warn: bool) -> Fit:
+    """Of log likelihoods [m], one for each loss."""
+    engine = Bolfi(prior, surrogate="log_likelihood", initial=MIN_LEARN)
+    m = len(np.atleast_2d(prior.to_array(theta)))
+    require(values.shape == (m,), "loss", f"have shape ({m},), one per theta", values.shape)
+    engine.tell(theta, values)
+    return engine.fit(warn=warn, stacklevel=4)
 
 
 def _of_table(table: Any, prior: Prior | None) -> tuple[Theta, Any]:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -120,3 +120,14 @@ class Effect:
     def prior(self) -> "Distribution":
         """Prior of the coefficient; numpyro loads with the first one read."""
         return self.make_prior()
+
+
+def prior_of(family: str, *numbers: float) -> Callable[[], "Distribution"]:
+    """A `make_prior` for the distribution of numpyro of that name and these arguments."""
+    return partial(_distribution, family, numbers)
+
+
+def _distribution(family: str, numbers: tuple[float, ...]) -> "Distribution":
+    import numpyro.distributions as dist
+
+    return getattr(dist, family)(*numbers)

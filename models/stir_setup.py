@@ -115,10 +115,7 @@ class StirSetup:
 
     @classmethod
     def from_recording(
-        cls,
-        recording: HasRig,
-        particles: int = 0,
-        numerics: Numerics | None = None,
+        cls, recording: HasRig, particles: int = 0, numerics: Numerics | None = None
     ) -> "StirSetup":
         """The setup that a recording's attributes describe (the first pivot position too).
 

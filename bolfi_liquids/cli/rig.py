@@ -60,8 +60,7 @@ def calibrate_cameras(  # noqa: PLR0913  an option each
         typer.Option(min=0.2, max=20.0, metavar="<float>", help="Side of a printed square, in cm."),
     ] = 2.5,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Of the lens; without it, camera_VIEW.json."),
+        Path | None, typer.Option(metavar="FILE", help="Of the lens; without it, camera_VIEW.json.")
     ] = None,
     rig: RigOption = None,
     view: Annotated[Literal["xz", "yz"], typer.Option(help="Which camera.")] = "xz",

@@ -13,8 +13,7 @@ EPILOG = examples("trim stir.nc", "trim stir.nc --start 4.2 --stop 11 --out cut.
 
 def trim(
     recording: Annotated[
-        Path,
-        typer.Argument(metavar="RECORDING", help="NetCDF file, or the directory of `record`."),
+        Path, typer.Argument(metavar="RECORDING", help="NetCDF file, or the directory of `record`.")
     ],
     start: Annotated[
         float | None,

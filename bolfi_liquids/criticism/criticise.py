@@ -11,12 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..calibration.baseline import CleanSource, open_clean, prior_warnings
 from ..calibration.model_error import Clean, clean_residuals, model_error
 from ..calibration.result import Calibration
-from ..calibration.stirs import (
-    effects_of,
-    held_out_noise,
-    stir_experiment,
-    with_model_error,
-)
+from ..calibration.stirs import effects_of, held_out_noise, stir_experiment, with_model_error
 from ..errors import Argument
 from ..inputs.frame import recording_warnings
 from ..inputs.open import Source, open_recordings

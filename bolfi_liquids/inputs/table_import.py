@@ -100,11 +100,9 @@ class Columns(Given):
     Several columns of `time`, such as seconds and nanoseconds, are added.
     """
 
-    time: Annotated[
-        tuple[Column[Seconds], ...],
-        OneOrSeveral,
-        Field(min_length=1),
-    ] = (Column[Seconds](column="time", unit="s"),)
+    time: Annotated[tuple[Column[Seconds], ...], OneOrSeveral, Field(min_length=1)] = (
+        Column[Seconds](column="time", unit="s"),
+    )
     x: Column[Metres] = Column[Metres](column="x", unit="m")
     y: Column[Metres] = Column[Metres](column="y", unit="m")
     z: Column[Metres] = Column[Metres](column="z", unit="m")

@@ -179,10 +179,7 @@ def decided(
         def least(tried: Surface) -> Judged:
             return learned.judge(tried.least(settings.risk), judge, seed=seed)
 
-        tried = {
-            "actions": surface(learned, search),
-            "actions_plug_in": surface(learned, at_best),
-        }
+        tried = {"actions": surface(learned, search), "actions_plug_in": surface(learned, at_best)}
         chosen, plug_in = (least(one) for one in tried.values())
         hold = None
         if chosen.fractions[:, 2].mean() > TENTH:

@@ -100,11 +100,7 @@ class Film(NamedTuple):
 
 
 def films_of(
-    calibration: "Calibration",
-    pour: "Pour | None",
-    compute: "Compute",
-    *,
-    progress: bool = True,
+    calibration: "Calibration", pour: "Pour | None", compute: "Compute", *, progress: bool = True
 ) -> list[Film]:
     """The run's films, those of the stir first; simulated where they are not there.
 

@@ -47,11 +47,7 @@ RECORDINGS = "recordings"
 SIMULATIONS = "simulations.sqlite"
 MOVING = "moving"
 REPORT = "report.html"
-RESULTS = {
-    "calibrate": "posterior.nc",
-    "criticise": "criticism.nc",
-    "pour": "pour.nc",
-}
+RESULTS = {"calibrate": "posterior.nc", "criticise": "criticism.nc", "pour": "pour.nc"}
 """File of each step's result, in the order of the steps."""
 
 OWN_FILES = (SIMULATIONS, *RESULTS.values(), GIVEN_POURS, RECORDINGS, MOVING, REPORT)
@@ -324,11 +320,7 @@ class Run:
         return tree
 
     def keep(
-        self,
-        step: str,
-        tree: "DataTree",
-        made_from: Mapping[str, Any],
-        summary: Mapping[str, Any],
+        self, step: str, tree: "DataTree", made_from: Mapping[str, Any], summary: Mapping[str, Any]
     ) -> None:
         """Write a result, and summary.json.
 

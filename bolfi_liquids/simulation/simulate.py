@@ -14,13 +14,7 @@ from ..files import given_path, new_file, write_netcdf
 from ..inference.arguments import checked_array
 from ..inputs.bundled import bundled_recording
 from ..inputs.cups import cups_of
-from ..inputs.described_liquid import (
-    COHESION,
-    DENSITY,
-    VISCOSITY,
-    Described,
-    check_effects,
-)
+from ..inputs.described_liquid import COHESION, DENSITY, VISCOSITY, Described, check_effects
 from ..inputs.limits import checked_number
 from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import check_distance, check_rate

@@ -28,21 +28,9 @@ def rotation_matrix(rotvec: Numbers) -> np.ndarray:
     cosine = 2.0 * (math.sin(0.5 * angle) / angle) ** 2 if angle > 1e-8 else 0.5
     return np.array(
         [
-            [
-                1.0 - cosine * (y * y + z * z),
-                cosine * x * y - sine * z,
-                cosine * x * z + sine * y,
-            ],
-            [
-                cosine * x * y + sine * z,
-                1.0 - cosine * (x * x + z * z),
-                cosine * y * z - sine * x,
-            ],
-            [
-                cosine * x * z - sine * y,
-                cosine * y * z + sine * x,
-                1.0 - cosine * (x * x + y * y),
-            ],
+            [1.0 - cosine * (y * y + z * z), cosine * x * y - sine * z, cosine * x * z + sine * y],
+            [cosine * x * y + sine * z, 1.0 - cosine * (x * x + z * z), cosine * y * z - sine * x],
+            [cosine * x * z - sine * y, cosine * y * z + sine * x, 1.0 - cosine * (x * x + y * y)],
         ]
     )
 

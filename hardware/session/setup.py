@@ -55,9 +55,7 @@ def confirm(plan: str, typed: str, address: str) -> Confirmation:
     """
     if typed.strip() != CONFIRMATION:
         raise RigError(
-            f"got {typed.strip()!r:.60}",
-            where="confirmation",
-            fix=f"type exactly: {CONFIRMATION}",
+            f"got {typed.strip()!r:.60}", where="confirmation", fix=f"type exactly: {CONFIRMATION}"
         )
     return Confirmation(_KEY, plan, address)
 

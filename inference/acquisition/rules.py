@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, cast
 
 import jax
 import numpy as np
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtr, ndtri, softmax
 
 from ..arguments import check_called, checked_array, checked_number
 from ..gp.namespaces import log_sum_exp
@@ -98,19 +98,14 @@ def candidates(rng: np.random.Generator, surrogate: Surrogate) -> Candidates:
     found = screen(shifts, lambda u: 0.5 * np.asarray(log_likelihood(u)))
     log_target, log_weights = found.log_target, found.log_weights
     log_base = log_weights - np.where(np.isfinite(log_target), log_target, 0.0)
-    power, weights = 1.0, _normalised(log_weights)
+    power, weights = 1.0, softmax(log_weights)
     while np.sum(weights**2) > 1.0 / MIN_EFFECTIVE and power > MIN_POWER:
         power = power / 2.0
-        weights = _normalised(power * log_target + log_base)
+        weights = softmax(power * log_target + log_base)
     positions = (np.arange(CANDIDATES) + rng.uniform()) / CANDIDATES
     rows = np.minimum(np.searchsorted(np.cumsum(weights), positions), len(weights) - 1)
     u = found.u[rows]
     return Candidates(u, power * log_target[rows], surrogate.log_success(u))
-
-
-def _normalised(log_weights: np.ndarray) -> np.ndarray:
-    weights = np.exp(log_weights - log_weights.max())
-    return weights / weights.sum()
 
 
 def log_moments(surrogate: Surrogate, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

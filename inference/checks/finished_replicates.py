@@ -7,11 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._lazy import xr
-from ..arguments import (
-    check_function,
-    checked_array,
-    checked_mapping,
-)
+from ..arguments import check_function, checked_array, checked_mapping
 from ..prior import Prior
 from .one_replicate import Replicate, as_theta
 from .ranks import quantiles

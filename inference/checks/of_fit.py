@@ -133,7 +133,7 @@ def check_fit(
     """
     recipe = recipe_of(fit)
     if observe is None:
-        estimated = getattr(recipe.options["surrogate"], "noise", None) is None
+        estimated = getattr(fit.family, "noise", None) is None
         noise = None if estimated else noise_of(fit)
         if noise is None and not estimated:
             raise ValueError(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._lazy import stats, xr
-from ..arguments import check_flag, check_kind, checked_array, checked_number
+from ..arguments import check_flag, check_kind, checked_array, checked_number, require
 from .finished_replicates import LOG_DENSITY, Quantity, Replicates
 from .ranks import bin_count, counts_below, p_value, quantiles, to_ranks
 
@@ -164,10 +164,7 @@ def _shape(name: str, ranks: np.ndarray, draws: int) -> str:
 
 
 def sbc(
-    made: Replicates,
-    *,
-    quantities: Mapping[str, Quantity] | None = None,
-    alpha: float = 0.01,
+    made: Replicates, *, quantities: Mapping[str, Quantity] | None = None, alpha: float = 0.01
 ) -> SBC:
     """Simulation-based calibration (Talts et al. 2018; Modrák et al. 2023).
 
@@ -339,8 +336,8 @@ def coverage(
             outside (0, 1).
     """
     nominal = checked_array("levels", levels)
-    if nominal.ndim != 1 or nominal.size == 0 or not ((nominal > 0) & (nominal < 1)).all():
-        raise ValueError(f"levels must lie between 0 and 1, got {levels}")
+    fits = nominal.ndim == 1 and nominal.size and ((nominal > 0) & (nominal < 1)).all()
+    require(fits, "levels", "lie between 0 and 1", levels)
     _check_arguments(made, alpha)
     check_flag("conservative", conservative)
     values = made.values(quantities)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import check_function, check_kind, checked_integer, checked_number, is_table
+from ..arguments import check_function, check_kind, check_runs, checked_integer, checked_number
 from ..notebook_display import Displayed
 from ..prior import Prior, checked_prior
 from ..simulations.bank import SimulationBank
@@ -250,7 +250,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     check_kind("plan", plan, Plan | None)
     checked_integer("seed", seed, 0)
     check_function("report", report)
-    _check_earlier(earlier)
+    check_runs("earlier", earlier, 3)
     count = 0
 
     def counted(phase: str, finished: int, total: int) -> None:
@@ -396,12 +396,3 @@ def _check_others(name: str, given: Any, kind: type) -> None:
                 "bank would take the runs of one for the other's: give each its own identity or "
                 "label"
             )
-
-
-def _check_earlier(earlier: Any) -> None:
-    three = isinstance(earlier, tuple | list) and len(earlier) == 3
-    if earlier is not None and not (three and is_table(earlier[0])):
-        raise ValueError(
-            "earlier must be (theta, signals, seeds), theta a mapping of names to values, or None, "
-            f"got {earlier!r:.100}"
-        )

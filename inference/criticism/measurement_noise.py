@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
+from scipy.special import softmax
 
 from .._float64 import in_float64
-from ..arguments import checked_array
+from ..arguments import checked_array, require
 from ..surrogates.measurement_noise import Layout, Nodes, correlated
 
 CORRELATIONS = np.linspace(0.0, 0.97, 40)  # of neighbouring samples
@@ -29,8 +30,7 @@ class Noise(Protocol):
 
 def check_noise(name: str, noise: object) -> None:
     """Raise ValueError unless it is a `Noise`."""
-    if not isinstance(noise, Noise):
-        raise ValueError(f"{name} must be a Noise, such as KnownNoise(0.01), got {noise!r:.100}")
+    require(isinstance(noise, Noise), name, "be a Noise, such as KnownNoise(0.01)", noise)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +48,8 @@ class KnownNoise:
 
     def __post_init__(self) -> None:
         sd = checked_array("sd", self.sd)
-        if not (np.isfinite(sd).all() and (sd >= 0.0).all()):
-            raise ValueError(f"sd must be finite and not negative, got {self.sd!r:.100}")
+        fits = np.isfinite(sd).all() and (sd >= 0.0).all()
+        require(fits, "sd", "be finite and not negative", self.sd)
 
     def covariance(self, at: Layout) -> np.ndarray:
         return np.diag(np.broadcast_to(np.asarray(self.sd, float) ** 2, at.channel.shape))
@@ -168,9 +168,8 @@ def rest_noise(
         )
     log_weight, squares = np.transpose([_restricted(rests, rho, trend) for rho in CORRELATIONS])
     log_weight = log_weight - 0.5 * freedom * np.log(squares)
-    weight = np.exp(log_weight - log_weight.max())
     rng = np.random.default_rng(seed)
-    which = rng.choice(len(weight), draws, p=weight / weight.sum())
+    which = rng.choice(len(log_weight), draws, p=softmax(log_weight))
     sd = np.sqrt(squares[which] / rng.chisquare(freedom, draws))
     return AutoregressiveNoise(sd, CORRELATIONS[which], sum(rest.size for rest in rests))
 

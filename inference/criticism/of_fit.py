@@ -77,7 +77,7 @@ def noise_of(fit: Fit) -> Noise | None:
     made of that: of a summary, by the mean, a covariance alone, of an estimate over several
     channels or of averages.
     """
-    family = fit.recipe.options["surrogate"]
+    family = fit.family
     if not isinstance(family, SignalFamily) or family.summary is not None:
         return None
     given: Any = family.noise

@@ -4,16 +4,7 @@ import numpy as np
 
 from .._lazy import stats
 from .optimise import minimise_many
-from .process import (
-    JITTER,
-    TREND_SD,
-    Data,
-    Hyper,
-    coordinates,
-    inverse_cholesky,
-    relevance,
-    trend,
-)
+from .process import JITTER, TREND_SD, Data, Hyper, coordinates, inverse_cholesky, relevance, trend
 
 GROWTH = 1.3  # hyperparameters are found anew when data have grown by this factor
 

@@ -43,7 +43,8 @@ def minimise_many(
     x = np.array(start, np.float64)
     k, d = x.shape
     now = Points(x, *_evaluate(value_and_grad, x, np.arange(k)))
-    inverse = np.tile(np.eye(d), (k, 1, 1)) / np.maximum(1.0, _norm(now.gradient))[:, None, None]
+    steep = np.maximum(1.0, np.sqrt(np.sum(now.gradient**2, 1)))
+    inverse = np.tile(np.eye(d), (k, 1, 1)) / steep[:, None, None]
     active = np.isfinite(now.value)
     for _ in range(MAX_ITERATIONS):
         if not active.any():
@@ -73,10 +74,6 @@ def _evaluate(
     value, gradient = value_and_grad(x, rows)
     bad = ~(np.isfinite(value) & np.isfinite(gradient).all(1))
     return np.where(bad, np.inf, value), np.where(bad[:, None], 0.0, gradient)
-
-
-def _norm(gradient: np.ndarray) -> np.ndarray:
-    return np.sqrt(np.sum(gradient**2, 1))
 
 
 def _search(
@@ -126,7 +123,8 @@ def minimise_in_box(
     size = last - first
     screen = sobol(0, 0, SCREENED_POINTS, dimension)
     order = np.argsort(objective(first + size * screen))[:REFINED_POINTS]
-    steps = DIFFERENCE * np.concatenate([np.zeros((1, dimension)), *_signed(dimension)])
+    one = np.eye(dimension)
+    steps = DIFFERENCE * np.concatenate([np.zeros((1, dimension)), one, -one])
 
     def value_and_grad(x: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         around = first + size * expit(x[:, None, :] + steps)
@@ -149,7 +147,3 @@ def surely_least(gp: GP) -> np.ndarray:
         return mean + np.sqrt(variance)
 
     return minimise_in_box(surely, gp.data.u.shape[1])
-
-
-def _signed(dimension: int) -> tuple[np.ndarray, np.ndarray]:
-    return np.eye(dimension), -np.eye(dimension)

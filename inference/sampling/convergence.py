@@ -84,16 +84,14 @@ def shortfall(
     most, least = limits(chains, draws)
     parts = []
     for measure, meaning in MEASURES.items():
-        values = {parameter: of[measure] for parameter, of in measures.items()}
-        if measure == "rhat":
-            missed = {name: value for name, value in values.items() if not value <= most}
-            worst, bound = max(missed, key=values.__getitem__, default=""), f"above {most:.3f}"
-        else:
-            missed = {name: value for name, value in values.items() if not value >= least}
-            worst, bound = min(missed, key=values.__getitem__, default=""), f"below {least:.0f}"
+        high = measure == "rhat"
+        sign, limit, side, digits = (1, most, "above", 3) if high else (-1, least, "below", 0)
+        excess = {name: sign * (of[measure] - limit) for name, of in measures.items()}
+        missed = [name for name, by in excess.items() if not by <= 0.0]
         if missed:
-            digits = ".3f" if measure == "rhat" else ".0f"
-            parts.append(f"{meaning} of {worst!r} is {missed[worst]:{digits}}, {bound}")
+            worst = max(missed, key=excess.__getitem__)
+            value = f"{measures[worst][measure]:.{digits}f}, {side} {limit:.{digits}f}"
+            parts.append(f"{meaning} of {worst!r} is {value}")
     if not parts:
         return ""
     advice = ConvergenceStatus.TOO_FEW_DRAWS

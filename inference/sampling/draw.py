@@ -97,10 +97,7 @@ def _cross_checked(u: np.ndarray, target: Target, effective: float) -> tuple[dic
         distance = quadrature.total_variation(flat, cells)
         if distance <= limit:
             break
-    checks = {
-        "quadrature_total_variation": distance,
-        "quadrature_total_variation_limit": limit,
-    }
+    checks = {"quadrature_total_variation": distance, "quadrature_total_variation_limit": limit}
     if distance <= limit:
         return checks, ""
     complaint = (

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtr, ndtri, softmax
 
 from ..gp.namespaces import log_sum_exp, namespace
 from ..sobol import sobol
@@ -167,8 +167,7 @@ class Population(NamedTuple):
     @property
     def weights(self) -> np.ndarray:
         """Weights of the points [n], whose sum is 1."""
-        weights = np.exp(self.log_weights - self.log_weights.max())
-        return weights / weights.sum()
+        return softmax(self.log_weights)
 
     @property
     def moments(self) -> tuple[np.ndarray, np.ndarray]:

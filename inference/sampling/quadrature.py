@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import softmax
 
 from .target import LOG_ZERO, Chains, Length, Target, log_likelihood, somewhere_finite
 
@@ -25,7 +26,6 @@ class Quadrature(NamedTuple):
     low: np.ndarray  # [n, d], prior quantiles
     width: np.ndarray  # [n]
     mass: np.ndarray  # [n], sums to one
-    log_evidence: float  # log of the likelihood's prior mean
     log_likelihood: np.ndarray  # [n], at the centres
 
 
@@ -69,10 +69,7 @@ def integrate(target: Target, budget: int = QUICK_BUDGET) -> Quadrature:
             *(np.concatenate([a[kept], b]) for a, b in zip(cells, children, strict=True))
         )
     log_mass = cells.value + d * np.log(cells.width)
-    top = log_mass.max()
-    mass = np.exp(log_mass - top)
-    evidence = float(top + np.log(mass.sum()))
-    return Quadrature(cells.low, cells.width, mass / mass.sum(), evidence, cells.value)
+    return Quadrature(cells.low, cells.width, softmax(log_mass), cells.value)
 
 
 def _first(target: Target) -> _Cells:

@@ -4,6 +4,7 @@ import os
 import traceback
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TypeGuard
 
@@ -82,17 +83,7 @@ def timed_out(timeout: float) -> Failure:
     return Failure(FailureKind.TIMEOUT, f"no signal after {timeout:g} s")
 
 
-def not_finite(what: str) -> Failure:
-    return Failure(FailureKind.NOT_FINITE, what)
-
-
-def unusable(what: str) -> Failure:
-    return Failure(FailureKind.UNUSABLE, what)
-
-
-def incomparable(what: str) -> Failure:
-    return Failure(FailureKind.INCOMPARABLE, what)
-
-
-def impossible(what: str) -> Failure:
-    return Failure(FailureKind.IMPOSSIBLE, what)
+not_finite = partial(Failure, FailureKind.NOT_FINITE)
+unusable = partial(Failure, FailureKind.UNUSABLE)
+incomparable = partial(Failure, FailureKind.INCOMPARABLE)
+impossible = partial(Failure, FailureKind.IMPOSSIBLE)

@@ -16,14 +16,7 @@ from typing import ClassVar, NamedTuple, cast
 
 import numpy as np
 
-from ..arguments import (
-    Unusable,
-    check_callable,
-    checked_integer,
-    checked_mapping,
-    float64,
-    require,
-)
+from ..arguments import Unusable, check_callable, checked_integer, checked_mapping, float64, require
 from ..types import Simulator, SingleSimulator
 from .bank import Simulation
 from .failures import Failure, is_unusable, raised, timed_out, unusable

@@ -6,8 +6,8 @@ import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +24,7 @@ from .job import OneByOne
 FILES = frozenset({"in", "out"})
 TAIL = 5  # lines of stderr that an error holds
 TAIL_LETTERS = 1000
+GUARD = "sh", "-c", "read _; kill -9 0"  # 0 is its own group
 
 _ends: ContextVar[float | None] = ContextVar("ends", default=None)  # of time.monotonic
 
@@ -41,8 +42,9 @@ class Program(OneByOne):
     Each run has an empty directory of its own, in which it starts, and which is removed when it
     has ended. A run fails if it ends with another exit code than 0, or if its output is missing
     or cannot be read; the error holds the last lines of its stderr. With `fit(timeout=)` a run
-    that is overdue is killed, with all processes of its group. Runs share nothing, so that threads
-    suffice to make several at a time: `fit(..., executor=ThreadPoolExecutor(4))`.
+    that is overdue is killed, with all processes of its group, and so it is where Python itself is
+    killed. Runs share nothing, so that threads suffice to make several at a time:
+    `fit(..., executor=ThreadPoolExecutor(4))`.
 
     Args:
         command: Its words are split as a shell does, without a shell. In braces, with a format if
@@ -85,6 +87,13 @@ class Program(OneByOne):
         super().__init__(run, _limited, describe(run))
 
 
+def check_names(simulator: object, parameters: Collection[str]) -> None:
+    """Raise ValueError for a `Program` that cannot be run with parameters of these names."""
+    run = simulator.simulate if isinstance(simulator, Program) else None
+    if isinstance(run, _Run):
+        run.check(parameters)
+
+
 @dataclass(frozen=True)
 class _Run:
     """One run of a program; see `Program`.
@@ -117,7 +126,7 @@ class _Run:
 
     def _simulate(self, directory: Path, theta: dict[str, float], seed: int) -> Any:
         known = {**theta, "seed": seed, **{name: str(directory / name) for name in FILES}}
-        self._check(theta, known)
+        self.check(theta)
         if isinstance(self.write, str):
             (directory / "in").write_text(self.write.format_map(known), encoding="utf-8")
         elif self.write is not None:
@@ -130,19 +139,22 @@ class _Run:
             return self.read(directory)
         return _numbers(directory / ("out" if "out" in self.named else "stdout"))
 
-    def _check(self, theta: Mapping[str, float], known: Mapping[str, object]) -> None:
+    def check(self, parameters: Collection[str]) -> None:
         """Raise ValueError for a name in braces that is none, and for a parameter without use."""
-        require(not FILES & theta.keys(), "parameters", f"not be named {sorted(FILES)}", [*theta])
-        unknown = sorted(set(self.named) - known.keys())
+        due = f"not be named {sorted(FILES)}"
+        require(not FILES & set(parameters), "parameters", due, [*parameters])
+        known = {*parameters, "seed", *FILES}
+        unknown = sorted(set(self.named) - known)
         require(not unknown, "names in braces", f"be among {sorted(known)}", unknown)
         told = callable(self.write) or (self.write is None and "in" in self.named)
-        unused = sorted(theta.keys() - set(self.named))
+        unused = sorted(set(parameters) - set(self.named))
         due = "all be in braces in the command or its input"
         require(told or not unused, "parameters", due, unused)
 
 
 def _execute(words: Sequence[str], directory: Path) -> None:
-    """Run a command in a directory; it ends with its whole group of processes when time is up.
+    """Run a command in a directory; it ends with its whole group of processes when time is up, and
+    when this process ends, however it does: then the guard's input ends.
 
     Raises:
         OSError: there is no such program.
@@ -150,22 +162,26 @@ def _execute(words: Sequence[str], directory: Path) -> None:
         TimeoutError: it took longer than `_limited` allows.
     """
     ends = _ends.get()
-    with open(directory / "stdout", "wb") as out, open(directory / "stderr", "wb") as err:
+    guarding = subprocess.Popen(GUARD, stdin=subprocess.PIPE, process_group=0)
+    with (
+        open(directory / "stdout", "wb") as out,
+        open(directory / "stderr", "wb") as err,
+        guarding as guard,
+    ):
         program = subprocess.Popen(
             words,
             cwd=directory,
             stdin=subprocess.DEVNULL,
             stdout=out,  # a file, for a pipe that a grandchild inherits never ends
             stderr=err,
-            process_group=0,
+            process_group=guard.pid,
         )
         try:
             code = program.wait(None if ends is None else max(ends - time.monotonic(), 0.0))
         except subprocess.TimeoutExpired as error:
             raise TimeoutError("overdue") from error
         finally:  # what the program left running, too, and if a person interrupts
-            with suppress(ProcessLookupError):
-                os.killpg(program.pid, signal.SIGKILL)
+            os.killpg(guard.pid, signal.SIGKILL)
             program.wait()
     if code:
         how = f"exit code {code}" if code > 0 else f"signal {signal.Signals(-code).name}"

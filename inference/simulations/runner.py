@@ -40,6 +40,9 @@ class Runner:
         compute: Where simulations are made and kept; the caller decides on batches.
         shape: Of one signal; None accepts any.
         identity: The simulator's name in the bank.
+
+    Attributes:
+        seconds: That all results took.
     """
 
     def __init__(
@@ -52,6 +55,7 @@ class Runner:
     ):
         self.simulate, self.shape = simulate, shape
         self._results = self._unusable = 0
+        self.seconds = 0.0
         self._resources = ExitStack()
         own = SimulationBank() if compute.bank is None else nullcontext(compute.bank)
         self.bank = self._resources.enter_context(own)
@@ -109,6 +113,7 @@ class Runner:
             self._begin()
         made = outcome.result()
         self._results += 1
+        self.seconds += made.seconds
         if is_unusable(made.error):
             self._unusable += 1
             if self._unusable == self._results == BATCH:

@@ -3,6 +3,7 @@
 A member with a body need not be written: a class that names the protocol as its base inherits it.
 """
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple, Protocol
 
@@ -32,9 +33,13 @@ class TrainingData(NamedTuple):
     u: np.ndarray  # [n, d], prior quantiles
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n]
-    tails: np.ndarray | None  # int [d], see `Prior.tails`
     runs: RunOutcomes  # all, failed ones too
-    prior: Prior | None = None  # of which the quantiles are
+    prior: Prior  # of which the quantiles are
+
+    @property
+    def tails(self) -> np.ndarray | None:
+        """See `Prior.tails`."""
+        return self.prior.tails
 
 
 class Measured(NamedTuple):
@@ -51,14 +56,17 @@ class Surrogate(Protocol):
     u: np.ndarray  # [n, d], where it was learned, fantasized points included
     log_likelihood: LogLikelihood
 
+    @abstractmethod
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new simulation at u [n, d], each [n, ...]."""
         ...
 
+    @abstractmethod
     def fantasize(self, u: np.ndarray) -> "Surrogate":
         """The surrogate after its own predictions at u [n, d] came true (pending points)."""
         ...
 
+    @abstractmethod
     def best(self) -> np.ndarray:
         """The u [d] that fits best."""
         ...

@@ -3,9 +3,7 @@
 from dataclasses import fields
 from typing import Any, cast
 
-import numpy as np
-
-from ..arguments import check_called, is_table
+from ..arguments import check_called
 from .base import Family, Surrogate
 from .discrepancy import DiscrepancyFamily
 from .log_likelihood import LogLikelihoodFamily
@@ -17,9 +15,6 @@ FAMILIES: dict[str, Any] = {
     "log_likelihood": LogLikelihoodFamily,
 }
 """Dataclasses by the name that users give; any other `Family` is given as an object."""
-
-BODILESS = ("u", "log_likelihood", "predict", "fantasize", "best")
-"""Members of `Surrogate` that each surrogate must write."""
 
 
 def resolve(surrogate: str | Family | None, options: dict[str, Any]) -> Family:
@@ -68,23 +63,6 @@ def resolve(surrogate: str | Family | None, options: dict[str, Any]) -> Family:
     return FAMILIES[str(surrogate)](**options)
 
 
-def plain_options(family: Family) -> dict[str, Any] | None:
-    """Those options of a family that are numbers, texts, arrays or None; None of a family that is
-    not the engine's own."""
-    if type(family) not in FAMILIES.values():
-        return None
-    return {name: value for name, value in vars(family).items() if _is_plain(value)}
-
-
-def _is_plain(value: Any) -> bool:
-    listed = isinstance(value, list | tuple) and not hasattr(value, "_fields")
-    if listed and any(is_table(one) for one in value):  # runs of a cheap simulator
-        return False
-    if listed or hasattr(value, "__array__"):
-        return np.asarray(value).dtype.kind in "biuf"
-    return value is None or isinstance(value, bool | int | float | str)
-
-
 def option_names(name: Any) -> set[str]:
     """Names of the options that the family of this name has."""
     return {field.name for field in fields(FAMILIES[name])}
@@ -96,20 +74,13 @@ def checked_surrogate(found: Any, family: Family) -> Surrogate:
     Raises:
         ValueError: it has not all members of `Surrogate`.
     """
-    members = {*BODILESS, *(name for name in vars(Surrogate) if not name.startswith("_"))}
-    missing = sorted(name for name in members if not _has(found, name))
+    members = {*Surrogate.__annotations__, *vars(Surrogate)}
+    public = sorted(name for name in members if not name.startswith("_"))
+    # no property is evaluated
+    missing = [name for name in public if not (hasattr(type(found), name) or hasattr(found, name))]
     if missing:
         raise ValueError(
             f"{type(family).__name__} must learn a Surrogate, got {type(found).__name__} without "
             f"{', '.join(missing)}; derive its class from `Surrogate`, and write these"
         )
     return found
-
-
-def _has(found: object, name: str) -> bool:
-    """Whether an object has a member that has a body; no property of a class that is derived from
-    `Surrogate` is evaluated."""
-    if Surrogate not in type(found).__mro__:
-        return hasattr(found, name)  # it may delegate to another object
-    stub = name in BODILESS and getattr(type(found), name, None) is getattr(Surrogate, name, None)
-    return name in getattr(found, "__dict__", {}) or not stub

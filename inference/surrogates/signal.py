@@ -7,14 +7,15 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import softmax
 
 from .._lazy import stats
 from ..arguments import (
     check_callable,
     check_flag,
+    check_runs,
     checked_integer,
     checked_number,
-    is_table,
     require,
 )
 from ..gp.optimise import minimise_in_box
@@ -146,9 +147,7 @@ class SignalSurrogate(OfProcesses):
     @cached_property
     def node_weights(self) -> np.ndarray:
         """Posterior weights of the nodes, given the best parameters."""
-        log_weights = node_log_densities(self.log_likelihood, self.best()[None])[0]
-        weights = np.exp(log_weights - log_weights.max())
-        return weights / weights.sum()
+        return softmax(node_log_densities(self.log_likelihood, self.best()[None])[0])
 
     @property
     def best_features(self) -> np.ndarray:
@@ -491,10 +490,7 @@ class SignalFamily(Family):
         check_callable("summary", self.summary)
         check_callable("discrepancy", self.discrepancy)
         check_flag("varying_noise", self.varying_noise)
-        pair = isinstance(self.cheap, tuple | list) and len(self.cheap) == 2
-        due = "be (theta, signals), theta a mapping of names to values, or None"
-        fits = self.cheap is None or (pair and is_table(self.cheap[0]))
-        require(fits, "cheap", due, self.cheap)
+        check_runs("cheap", self.cheap, 2)
         checked_integer("components", self.components)
         if self.noise is not None and law_of(self.noise) is None:
             check_noise(self.noise)  # pyright: ignore[reportArgumentType]  no function is left
@@ -519,15 +515,14 @@ class SignalFamily(Family):
         if self.cheap is None:
             return
         check_support(prior, prior.to_dict(prior.to_array(self.cheap[0])))
-        runs = self._cheap_runs(observed, prior)
-        count = 0 if runs is None else len(runs.u)
+        count = len(self._cheap_runs(self.cheap, observed, prior).u)
         due = f"hold {MIN_CHEAP} successful runs"
         require(count >= MIN_CHEAP, "cheap", due, count, cure="simulate more")
 
-    def _cheap_runs(self, observed: ObservedOutput, prior: Prior | None) -> CheapRuns | None:
-        if self.cheap is None or prior is None:
-            return None
-        theta, signals = self.cheap
+    def _cheap_runs(
+        self, cheap: tuple[Theta, ArrayLike], observed: ObservedOutput, prior: Prior
+    ) -> CheapRuns:
+        theta, signals = cheap
         u = np.atleast_2d(prior.to_unit(theta))
         shape = None if self.any_shape else observed.observed.shape
         outputs = self.measure(observed, told_signals(signals, len(u), shape)[0]).features
@@ -536,9 +531,9 @@ class SignalFamily(Family):
 
     def _cheap_features(self, data: TrainingData, scale: OutputScale) -> CheapRuns | None:
         """Cheap runs on the emulator's scale, where they have a value on it."""
-        runs = self._cheap_runs(data.observed, data.prior)
-        if runs is None:
+        if self.cheap is None:
             return None
+        runs = self._cheap_runs(self.cheap, data.observed, data.prior)
         with np.errstate(all="ignore"):
             features = scale.of(runs.outputs)
         finite = np.isfinite(features).all(1)

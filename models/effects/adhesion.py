@@ -2,13 +2,7 @@
 
 import numpy as np
 
-from ..effect import Effect
-
-
-def _prior():
-    import numpyro.distributions as dist
-
-    return dist.Uniform(-1.0, 1.0)
+from ..effect import Effect, prior_of
 
 
 def _wet(cosine: np.ndarray, coefficient: np.ndarray) -> np.ndarray:
@@ -24,7 +18,7 @@ EFFECT = Effect(
     "added to the angle's cosine, and stirs do not show it.",
     source="Young 1805 (Phil. Trans. R. Soc. 95, 65): the cosine is the work of adhesion over the "
     "surface tension, less 1 (Dupre 1869)",
-    make_prior=_prior,
+    make_prior=prior_of("Uniform", -1.0, 1.0),
     wetting=_wet,
     lowest=-2.0,
     highest=2.0,

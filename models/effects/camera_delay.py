@@ -2,14 +2,7 @@
 
 import numpy as np
 
-from ..effect import Effect
-
-
-def _prior():
-    import numpyro.distributions as dist
-
-    # either clock may be the late one
-    return dist.Normal(0.0, 0.1)
+from ..effect import Effect, prior_of
 
 
 def _signal(time, angles, coefficient):
@@ -32,6 +25,7 @@ EFFECT = Effect(
     "positions are the late ones).",
     source="Offset of two clocks: seen(t) = true(t - delay), by a cubic spline, held constant "
     "outside the recorded time",
-    make_prior=_prior,
+    # either clock may be the late one
+    make_prior=prior_of("Normal", 0.0, 0.1),
     signal=_signal,
 )

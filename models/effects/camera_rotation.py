@@ -2,13 +2,7 @@
 
 import numpy as np
 
-from ..effect import Effect
-
-
-def _prior():
-    import numpyro.distributions as dist
-
-    return dist.Normal(0.0, np.radians(5.0))
+from ..effect import Effect, prior_of
 
 
 def _signal(time, angles, coefficient):
@@ -28,6 +22,6 @@ EFFECT = Effect(
     text="Both cameras together are turned about the vertical, from +x towards +y, so that each "
     "plane shows some of the other.",
     source="Components of the stick's direction in axes turned by the angle",
-    make_prior=_prior,
+    make_prior=prior_of("Normal", 0.0, np.radians(5.0)),
     signal=_signal,
 )

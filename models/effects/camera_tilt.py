@@ -6,30 +6,34 @@ angles only by the product of tilt and both angles (below 0.01 degrees for 1, 3 
 is left out. `camera_tilt_yz` rolls that camera.
 """
 
+from functools import partial
+
 import numpy as np
 
-from ..effect import Effect
+from ..effect import Effect, prior_of
 
 
-def _prior():
-    import numpyro.distributions as dist
-
-    return dist.Normal(0.0, np.radians(1.0))
+def _signal(time, angles, coefficient, plane):
+    return angles + coefficient[:, None, None] * np.eye(2)[plane]
 
 
-def _signal(time, angles, coefficient):
-    offset = np.stack([coefficient, np.zeros_like(coefficient)], axis=-1)
-    return angles + offset[:, None]
+def rolled(name, plane, text):
+    """The effect of one camera rolled; `plane` is 0 for xz, 1 for yz."""
+    return Effect(
+        name=name,
+        unit="rad",
+        neutral=0.0,
+        acts_in="sensor",
+        text=text,
+        source="A camera rolled about its optical axis turns the whole picture by the angle",
+        make_prior=prior_of("Normal", 0.0, np.radians(1.0)),
+        signal=partial(_signal, plane=plane),
+    )
 
 
-EFFECT = Effect(
-    name="camera_tilt",
-    unit="rad",
-    neutral=0.0,
-    acts_in="sensor",
-    text="The camera that looks along y is rolled: the inclination in the xz plane shows a "
-    "constant offset.",
-    source="A camera rolled about its optical axis turns the whole picture by the angle",
-    make_prior=_prior,
-    signal=_signal,
+EFFECT = rolled(
+    "camera_tilt",
+    0,
+    "The camera that looks along y is rolled: the inclination in the xz plane shows a constant "
+    "offset.",
 )

@@ -1,12 +1,6 @@
 """Another depth of liquid than was written down."""
 
-from ..effect import Effect
-
-
-def _prior():
-    import numpyro.distributions as dist
-
-    return dist.Normal(0.0, 3e-3)
+from ..effect import Effect, prior_of
 
 
 def _rig(rig, coefficient):
@@ -21,6 +15,6 @@ EFFECT = Effect(
     text="The liquid is deeper than the recording says (negative: shallower).",
     source="Volume of a cylinder less the submerged stick, in particles of unchanged size, so "
     "that one particle is the resolution",
-    make_prior=_prior,
+    make_prior=prior_of("Normal", 0.0, 3e-3),
     rig=_rig,
 )

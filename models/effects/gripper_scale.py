@@ -2,13 +2,7 @@
 
 import numpy as np
 
-from ..effect import Effect
-
-
-def _prior():
-    import numpyro.distributions as dist
-
-    return dist.LogNormal(0.0, 0.1)
+from ..effect import Effect, prior_of
 
 
 def _rig(rig, coefficient):
@@ -26,7 +20,7 @@ EFFECT = Effect(
     text="The gripper's horizontal displacements are this many times what the recording says.",
     source="Scaling of x and y about the path's first point, as by a wrong unit or kinematic "
     "model of the robot; heights are kept",
-    make_prior=_prior,
+    make_prior=prior_of("LogNormal", 0.0, 0.1),
     rig=_rig,
     lowest=0.0,
 )

@@ -3,14 +3,7 @@
 It holds a stick off the vertical before the gripper moves: `start_tilt` of the setup.
 """
 
-from ..effect import Effect
-
-
-def _prior():
-    import numpyro.distributions as dist
-
-    # 5e-4 N m holds the stick of the bundled recordings 1.6 degrees off the vertical
-    return dist.HalfNormal(5e-4)
+from ..effect import Effect, prior_of
 
 
 def _rig(rig, coefficient):
@@ -26,7 +19,8 @@ EFFECT = Effect(
     source="Coulomb friction of a ball joint, as an impulse of at most torque times step (Moreau "
     "1988, Unilateral contact and dry friction); small swings in air lose the amplitude "
     "4 torque / (mass g length / 2) each cycle",
-    make_prior=_prior,
+    # 5e-4 N m holds the stick of the bundled recordings 1.6 degrees off the vertical
+    make_prior=prior_of("HalfNormal", 5e-4),
     rig=_rig,
     lowest=0.0,
 )

@@ -1,15 +1,8 @@
 """A viscosity that falls with the shear rate."""
 
-from ..effect import Effect
+from ..effect import Effect, prior_of
 
 ONSET_TIME = 1.0  # s, one over the shear rate at which thinning sets in
-
-
-def _prior():
-    import numpyro.distributions as dist
-
-    # from no thinning to that of a carbomer gel
-    return dist.Uniform(0.0, 0.8)
 
 
 def _rheology():
@@ -32,7 +25,8 @@ EFFECT = Effect(
     "n of its power law falls short of 1; the viscosity is the one at rest.",
     source="Carreau 1972 (Trans. Soc. Rheol. 16, 99) without a limit at high rates: viscosity "
     "times (1 + (rate 1 s)^2)^((n - 1) / 2)",
-    make_prior=_prior,
+    # from no thinning to that of a carbomer gel
+    make_prior=prior_of("Uniform", 0.0, 0.8),
     make_rheology=_rheology,
     lowest=-1.0,
     highest=0.95,

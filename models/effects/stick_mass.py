@@ -1,12 +1,6 @@
 """Another mass of the stick than was written down."""
 
-from ..effect import Effect
-
-
-def _prior():
-    import numpyro.distributions as dist
-
-    return dist.LogNormal(0.0, 0.15)
+from ..effect import Effect, prior_of
 
 
 def _rig(rig, coefficient):
@@ -22,7 +16,7 @@ EFFECT = Effect(
     source="Weight and inertia of a uniform rod are proportional to its mass; in a liquid of "
     "viscosity mu and density rho the stick depends on mu / mass and rho / mass alone, so in "
     "air its swing does not show its mass",
-    make_prior=_prior,
+    make_prior=prior_of("LogNormal", 0.0, 0.15),
     rig=_rig,
     lowest=0.01,
 )

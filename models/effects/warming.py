@@ -1,14 +1,6 @@
 """A liquid that gets warmer, and so thinner, while it is watched."""
 
-from ..effect import Effect
-
-
-def _prior():
-    import numpyro.distributions as dist
-
-    # a factor of two within 7 s: hot liquid in a cold cup; glycerol at room temperature, which
-    # loses 0.09 per kelvin, changes by a tenth of that
-    return dist.Normal(0.0, 0.1)
+from ..effect import Effect, prior_of
 
 
 def _rheology():
@@ -30,6 +22,8 @@ EFFECT = Effect(
     "of the pour (negative: the liquid cools).",
     source="First order of any law of viscosity and temperature at a constant rate of heating; "
     "glycerol at 20 C loses 0.09 of the logarithm per kelvin (Cheng 2008)",
-    make_prior=_prior,
+    # a factor of two within 7 s: hot liquid in a cold cup; glycerol at room temperature, which
+    # loses 0.09 per kelvin, changes by a tenth of that
+    make_prior=prior_of("Normal", 0.0, 0.1),
     make_rheology=_rheology,
 )

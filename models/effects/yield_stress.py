@@ -1,15 +1,8 @@
 """A stress below which the liquid does not flow."""
 
-from ..effect import Effect
+from ..effect import Effect, prior_of
 
 REGULARISATION_TIME = 4.0  # s: below a shear rate of 1 / (4 s) the liquid creeps
-
-
-def _prior():
-    import numpyro.distributions as dist
-
-    # hand gels have about 10 Pa, hair gels 30 to 100
-    return dist.HalfNormal(15.0)
 
 
 def _rheology():
@@ -35,7 +28,8 @@ EFFECT = Effect(
     text="The liquid is a gel: it flows only where it is sheared by more than this stress.",
     source="Herschel & Bulkley 1926, regularised by Papanastasiou 1987 (J. Rheol. 31, 385): "
     "viscosity + yield stress (1 - exp(-m rate)) / rate with m = 4 s",
-    make_prior=_prior,
+    # hand gels have about 10 Pa, hair gels 30 to 100
+    make_prior=prior_of("HalfNormal", 15.0),
     make_rheology=_rheology,
     lowest=0.0,
 )

@@ -11,14 +11,7 @@ from functools import cache
 import numpy as np
 
 from ..apic.filling import Cylinder, fill_cup
-from ..apic.geometry import (
-    ABOVE,
-    INSIDE,
-    NEAREST_OF_FILMS,
-    OUTSIDE,
-    Geometry,
-    sample_geometry,
-)
+from ..apic.geometry import ABOVE, INSIDE, NEAREST_OF_FILMS, OUTSIDE, Geometry, sample_geometry
 from ..apic.grid import WALL, Grid
 from .resolution import Filled, cell_for, particles_for
 

@@ -294,14 +294,20 @@ def test_what_is_no_surrogate_is_refused_with_what_is_missing():
     """Where it searches and where it fits, of a class derived from `Surrogate` or not."""
     found = fitted(QuadraticSurface()).learned
 
-    class Unfinished(Surrogate):
+    class Abstract(Surrogate):
         u, best, predict = found.u, found.best, found.predict
+
+    class Unfinished(Abstract):
+        fantasize = found.fantasize
+
+    with pytest.raises(TypeError, match="fantasize"):
+        Abstract()
 
     class Odd(type(QuadraticSurface())):
         def learn(self, data, key):
             return returned
 
-    for returned, missing in {None: "best.*warnings", Unfinished(): "fantasize, log_like"}.items():
+    for returned, missing in {None: "best.*warnings", Unfinished(): "log_likelihood"}.items():
         engine = inference.Bolfi(PRIOR, OBSERVED, surrogate=Odd(), initial=3)
         engine.tell(PRIOR.from_unit(POINTS), simulate(PRIOR.from_unit(POINTS), range(3)))
         for act in (engine.fit, engine.ask):

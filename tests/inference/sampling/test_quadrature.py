@@ -52,9 +52,8 @@ def target(d, sd, apart=True):
 
 
 @pytest.mark.parametrize(("d", "sd"), [(1, 0.002), (2, 0.05), (2, 0.002)])
-def test_evidence_and_moments_of_a_peak(d, sd):
+def test_moments_of_a_peak(d, sd):
     cells = integrate(target(d, sd, apart=False))
-    assert abs(cells.log_evidence) < 2e-3
     found = moments(cells)
     np.testing.assert_allclose(found[0], 0.31, atol=0.01 * sd)
     np.testing.assert_allclose(found[1], sd, rtol=0.01)
@@ -69,7 +68,6 @@ def test_marginals_with_two_separate_modes(d, sd):
     edges = np.concatenate([[0.0], 0.31 + sd * np.linspace(-2.0, 2.0, 9), [0.5, 1.0]])
     exact = 0.8 * np.diff(norm.cdf(edges, 0.31, sd)) + 0.2 * np.diff(norm.cdf(edges, 0.72, sd))
     np.testing.assert_allclose(marginal(cells, 0, edges), exact, atol=2e-3)
-    assert abs(cells.log_evidence) < 5e-3
 
 
 def test_agrees_with_a_dense_grid_on_a_banana():
@@ -77,7 +75,6 @@ def test_agrees_with_a_dense_grid_on_a_banana():
     axis = (np.arange(2000) + 0.5) / 2000
     x, y = np.meshgrid(8.0 * (axis - 0.5), 8.0 * (axis - 0.5), indexing="ij")
     density = np.exp(-0.5 * (x / 1.5) ** 2 - 0.5 * ((y - 0.5 * x**2 + 1.0) / 0.3) ** 2)
-    assert cells.log_evidence == pytest.approx(np.log(density.mean()), abs=5e-3)
     exact = (density.sum(0) / density.sum()).reshape(20, -1).sum(1)
     np.testing.assert_allclose(marginal(cells, 1, np.linspace(0.0, 1.0, 21)), exact, atol=2e-3)
 
@@ -85,7 +82,6 @@ def test_agrees_with_a_dense_grid_on_a_banana():
 def test_what_is_not_finite_has_no_mass():
     cells = integrate(Target(holes, 2))
     np.testing.assert_allclose(moments(cells)[0], 0.75, atol=1e-3)
-    assert np.isfinite(cells.log_evidence)
 
 
 def test_draws_follow_the_cells_and_a_shift_is_noticed():

@@ -3,6 +3,7 @@
 import os
 import pickle
 import random
+import signal
 import subprocess
 import sys
 import time
@@ -223,6 +224,34 @@ def test_what_hangs_is_killed_with_its_children(here, workers):
     for kept in (here / "failed").iterdir():
         for pid in (kept / "pids").read_text().split():
             assert ended(pid)
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
+def test_nothing_goes_on_after_python_is_killed(here, how):
+    code = (
+        "from bolfi_liquids.inference.simulations.program import Program; "
+        f"Program('sh -c \"echo $$ >{here}/pid; mv {here}/pid {here}/started; sleep 600\"')"
+        ".simulate({}, 0)"
+    )
+    started = here / "started"
+    with subprocess.Popen([sys.executable, "-c", code]) as python:
+        while not started.exists():
+            time.sleep(0.01)
+        python.send_signal(how)
+    assert ended(started.read_text().strip())
+
+
+def test_a_misspelt_parameter_costs_no_simulation(here):
+    prior = inference.Prior({"rate": dist.Uniform(0.0, 1.0)})
+    for command, told in {"touch {rat}": "names in braces.*rat", "touch b": "parameters"}.items():
+        program = Program(f"{command} {here}/ran")
+        for make in (
+            lambda program: inference.fit(program, prior, [0.5], progress=False),
+            lambda program: inference.FitPipeline(program, prior),
+        ):
+            with pytest.raises(ValueError, match=told):
+                make(program)
+    assert not (here / "ran").exists()
 
 
 def test_a_person_s_interrupt_ends_the_program(here, monkeypatch):

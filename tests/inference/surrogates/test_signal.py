@@ -35,7 +35,8 @@ def learned(u, signals, observed, **options):
     view = family.view(observed)
     measured = family.measure(view, signals)
     runs = RunOutcomes(u, np.isfinite(measured.discrepancy))
-    known = TrainingData(view, u, measured.features, measured.discrepancy, None, runs)
+    prior = inference.Prior({f"u{i}": dist.Uniform(0.0, 1.0) for i in range(u.shape[1])})
+    known = TrainingData(view, u, measured.features, measured.discrepancy, runs, prior)
     return family.learn(known, np.zeros(2, np.uint32))
 
 
