@@ -110,8 +110,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         budget: Simulations of the search. Eight more check it at draws of the posterior, eight
             further ones follow if they move it, and four measure the noise between seeds.
         until: What ends the search earlier, see `known`. After the start design it is looked at
-            about every fifth simulation, at the end of a batch, unless the fit has warnings. Pours
-            that this needs are simulated first, and kept in `out`.
+            about every fifth simulation, at the end of a batch, and must be reached twice in a row
+            by fits without warnings. Pours that this needs are simulated first, and kept in `out`.
         seed: Seed of all random draws.
         surrogate: "signal", which emulates the inclination itself and allows for an error of the
             simulator, or "discrepancy", the paper's, which does not.
@@ -130,7 +130,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
 
     Raises:
         InputError: A recording, the prior, a setting, `timeout` or `out` cannot be used, or the
-            budget ends before `until` is looked at.
+            budget is spent before `until` could end the search.
         ValueError, ImportError, ConnectionError: `executor` cannot be used.
         RuntimeError: Simulations failed; the message says how.
     """

@@ -32,7 +32,7 @@ class Goal(NamedTuple):
 
 
 def check_goal(goal: object, settings: CalibrationSettings, parameters: int) -> None:
-    """Refuse what is no goal, and a budget that is spent before it is looked at.
+    """Refuse what is no goal, and a budget that is spent before it could end the search.
 
     Args:
         goal: Of a calibration; None is none.
@@ -40,7 +40,7 @@ def check_goal(goal: object, settings: CalibrationSettings, parameters: int) -> 
         parameters: Number of the prior.
     """
     from ..inference.sobol import start_size
-    from ..inference.until import EVERY
+    from ..inference.until import soonest
 
     if goal is None:
         return
@@ -48,10 +48,10 @@ def check_goal(goal: object, settings: CalibrationSettings, parameters: int) -> 
         fix = 'give bolfi_liquids.known("spillage=0.02"), or another tolerance'
         raise InputError(f"{goal!r:.80}", where=Argument("until"), fix=fix)
     start = MIN_SIMULATIONS if settings.surrogate == "discrepancy" else start_size(parameters)
-    first = -(-(start + EVERY) // settings.batch) * settings.batch  # the end of a batch
-    if settings.budget <= first:
+    least = soonest(start, settings.batch)
+    if settings.budget <= least:
         raise InputError(
-            f"{settings.budget} simulations, and the first look is after {first}",
+            f"{settings.budget} simulations, and `until` may end the search after {least}",
             where=Argument("budget"),
-            fix=f"give more than {first}, or leave `until` out",
+            fix=f"give more than {least}, or leave `until` out",
         )
