@@ -53,6 +53,7 @@ nb_execution_mode = "force" if os.environ.get("NOTEBOOKS") else "off"
 nb_execution_excludepatterns = ["*paper_figures*"]  # it shows what hours of `make paper` drew
 nb_execution_timeout = -1
 nb_execution_raise_on_error = True
+os.environ["PYTHONWARNINGS"] = "ignore:IProgress not found"  # tqdm's, in each kernel
 nb_ipywidgets_js = {}  # they would come from elsewhere
 
 add_module_names = False
