@@ -10,7 +10,7 @@ import typer
 
 from .. import __version__
 from ..errors import InputError
-from ..guide import PAGES, for_terminal
+from ..guide import PAGES, for_terminal, title
 from ..inputs.settings import (
     BaselineSettings,
     CalibrationSettings,
@@ -345,8 +345,8 @@ def guide(
     """Show a page of the guide: files, priors, messages and more."""
     if page is None:
         width = max(map(len, PAGES))
-        for name, about in PAGES.items():
-            typer.echo(f"{name:{width}}  {about}")
+        for name in PAGES:
+            typer.echo(f"{name:{width}}  {title(name)}")
         typer.echo("read one: bolfi-liquids guide PAGE")
         return
     from rich.console import Console
