@@ -14,6 +14,7 @@ from .models import Cups as Cups
 from .next_stir import NextStir as NextStir
 from .next_stir import design_stir as design_stir
 from .pouring.choose import choose_pour as choose_pour
+from .pouring.known import known as known
 from .pouring.result import Pour as Pour
 from .reporting.report import report as report
 from .robot.pour import execute_pour as execute_pour

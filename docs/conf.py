@@ -35,7 +35,6 @@ extensions = [
     "sphinx_copybutton",
 ]
 nitpicky = True
-nitpick_ignore_regex = [("py:(class|exc)", ".*")]  # of annotations, most of them of other projects
 suppress_warnings = ["ref.python"]  # two packages have a `Rig`; annotations name the robot's
 smartquotes_action = "D"  # dashes alone
 highlight_language = "none"
@@ -54,6 +53,7 @@ nb_execution_mode = "force" if os.environ.get("NOTEBOOKS") else "off"
 nb_execution_excludepatterns = ["*paper_figures*"]  # it shows what hours of `make paper` drew
 nb_execution_timeout = -1
 nb_execution_raise_on_error = True
+os.environ["PYTHONWARNINGS"] = "ignore:IProgress not found"  # tqdm's, in each kernel
 nb_ipywidgets_js = {}  # they would come from elsewhere
 
 add_module_names = False
@@ -68,10 +68,18 @@ napoleon_numpy_docstring = False
 napoleon_attr_annotations = False  # the signature has them
 
 EXPORTS, HOMES = exports(), homes()
+FOREIGN = "collections|concurrent|contextlib|jax|numpy|numpyro|os|pathlib|xarray"
+nitpick_ignore_regex = [  # classes in annotations: of other projects, in quotes, not public
+    ("py:class", rf"({FOREIGN})\..*|tuple\[.*"),
+    ("py:class", "ArrayLike|Axes|DataTree|Dataset|Distribution|NDArray|Path|ValidationError"),
+    ("py:class", "PivotPath|PourSummary"),
+    ("py:class", rf"(?!({'|'.join(EXPORTS)})\.\w+$)bolfi_liquids\..*"),
+]
 ENTRIES = {f"{home}.{name}": EXPORTS[home][name] for home, name in HOMES.values()}
 GUIDE = "bolfi_liquids/guide"
 CODE = re.compile(r"(?<!`)`([^`]+)`(?!`)")
 COMMAND = re.compile(r"bolfi-liquids guide (\w+)")
+TEMPLATE = "`bolfi-liquids rig template`"
 STAR = re.compile(r"(?<!\*)\*(?!\*)")  # two are napoleon's
 
 
@@ -87,10 +95,13 @@ def draw_gallery(app):
             (folder / f"{path.stem}-{number}.png").write_bytes(b64decode(figure))
 
 
-def link_commands(app, docname, source):
+def adapt(app, docname, source):
     """Where the terminal is told the command that shows a page, the site links the page."""
     if docname.startswith(GUIDE):
         source[0] = re.sub(f"`{COMMAND.pattern}`", r"[\g<0>](\1.md)", source[0])
+        source[0] = source[0].replace(TEMPLATE, f"[{TEMPLATE}](/docs/rig.md)")
+    if docname == "README":
+        source[0] = source[0].replace(f"# {project}\n", "# Overview\n", 1)
 
 
 def skip(app, what, name, obj, skipped, options):
@@ -173,7 +184,7 @@ def finish(app, error):
 def setup(app):
     app.add_html_math_renderer("mathml", (visit_math, None), (visit_math, None))
     app.connect("builder-inited", draw_gallery)
-    app.connect("source-read", link_commands)
+    app.connect("source-read", adapt)
     app.connect("autodoc-skip-member", skip)
     app.connect("autodoc-process-docstring", describe, priority=600)  # after napoleon
     app.connect("autodoc-process-signature", hide_fields)

@@ -10,6 +10,7 @@ from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
 from .result import Fit
 
 EVERY = 5  # simulations between two looks
+IN_A_ROW = 2  # looks at which the error must be below the tolerance
 
 
 @dataclass(frozen=True)
@@ -62,15 +63,27 @@ def checked_budget(budget: object, least: int) -> tuple[int, Until | None]:
 def enough(engine: Bolfi, until: Until | None) -> Callable[[], bool]:
     """A function that says whether to stop: after the start design it looks at every fifth
     simulation."""
-    looked, reached = engine.initial, False
+    looked, in_a_row = engine.initial, 0
 
     def stop() -> bool:
-        nonlocal looked, reached
+        nonlocal looked, in_a_row
         early = engine.told < looked + EVERY or engine.succeeded < MIN_LEARN
         if until is None or early:
             return False
-        before, looked = reached, engine.told
-        reached = until._reached(engine.fit(warn=False))
-        return before and reached
+        looked = engine.told
+        in_a_row = in_a_row + 1 if until._reached(engine.fit(warn=False)) else 0
+        return in_a_row == IN_A_ROW
 
     return stop
+
+
+def soonest(start: int, batch: int) -> int:
+    """Simulations after which a search may end at the earliest.
+
+    Args:
+        start: In the start design.
+        batch: Made between two questions whether to stop.
+    """
+    for _ in range(IN_A_ROW):
+        start = -(-(start + EVERY) // batch) * batch
+    return start

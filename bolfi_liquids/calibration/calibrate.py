@@ -56,6 +56,7 @@ from .model_error import (
 from .result import Calibration
 from .stirs import camera_noise, sensor_noise, with_model_error
 from .summary import CalibrationSummary
+from .until import Goal, check_goal
 
 if TYPE_CHECKING:
     from ..inference import Prior
@@ -74,6 +75,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     pours: Pours | None = None,
     cups: "Cups | str | Path | None" = None,
     budget: int = 20,
+    until: Goal | None = None,
     seed: int = 0,
     surrogate: Surrogate = "signal",
     batch: int = 4,
@@ -107,6 +109,9 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         cups: With which they were made, or a TOML file of them; None takes the bundled ones.
         budget: Simulations of the search. Eight more check it at draws of the posterior, eight
             further ones follow if they move it, and four measure the noise between seeds.
+        until: What ends the search earlier, see `known`. After the start design it is looked at
+            about every fifth simulation, at the end of a batch, and must be reached twice in a row
+            by fits without warnings. Pours that this needs are simulated first, and kept in `out`.
         seed: Seed of all random draws.
         surrogate: "signal", which emulates the inclination itself and allows for an error of the
             simulator, or "discrepancy", the paper's, which does not.
@@ -124,12 +129,14 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         progress: Whether to show bars on stderr.
 
     Raises:
-        InputError: A recording, the prior, a setting, `timeout` or `out` cannot be used.
+        InputError: A recording, the prior, a setting, `timeout` or `out` cannot be used, or the
+            budget is spent before `until` could end the search.
         ValueError, ImportError, ConnectionError: `executor` cannot be used.
         RuntimeError: Simulations failed; the message says how.
     """
     settings = CalibrationSettings(
         budget=budget,
+        until=getattr(until, "text", None),
         batch=batch,
         seed=seed,
         surrogate=surrogate,
@@ -148,7 +155,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
     )
     prior = _usual_prior(path, resume) if prior is None else prior
-    record = run_record(settings, prior, stirring, given)
+    check_goal(until, settings, len(prior))
+    record = run_record(settings, prior, stirring, given, until)
     with (
         open_compute(executor, timeout) as compute,
         Run.begun(path, record, resume=resume, growing="settings.budget") as run,
@@ -160,7 +168,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         for notice in (*recording_warnings(opened), *prior_warnings(given, prior)):
             logger.warning(notice)
         if run.result("calibrate") is None:
-            _calibrate(run, settings, stirring, clean, compute, progress)
+            _calibrate(run, until, stirring, clean, compute, progress)
         return Calibration.of(run)
 
 
@@ -169,14 +177,17 @@ def run_record(
     prior: "Prior",
     stirring: StirSimulator,
     given: Sequence[Recording | Baseline] = (),
+    until: Goal | None = None,
 ) -> dict[str, Any]:
     """Content of run.toml: settings, inputs, versions; see `run.run.MUST_AGREE`."""
     baseline = {"baseline": [one.hash for one in given]} if given else {}
+    chosen = {name: of for name, of in asdict(settings).items() if of is not None}
+    scene = {} if until is None else until.scene
     return {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "settings": asdict(settings) | {"prior": describe_prior(prior)},
+        "settings": {**chosen, "prior": describe_prior(prior)},
         "engine": {"version": generations()["engine"]},
-        "simulator": stirring.settings,
+        "simulator": {**stirring.settings, **scene},
         "inputs": {"sha256": [one.hash for one in stirring.recordings], **baseline},
         "files": {"recordings": [one.path.name for one in stirring.recordings]},
         "versions": versions(),
@@ -185,25 +196,33 @@ def run_record(
 
 def _calibrate(
     run: Run,
-    settings: CalibrationSettings,
+    until: Goal | None,
     stirring: StirSimulator,
     clean: Sequence[Part],
     compute: "Compute",
     progress: bool,
 ) -> None:
     """Search, confirm, judge, and keep the result in the run."""
+    from ..inference import Until
     from ..inference.criticism import KnownNoise
 
+    settings = run.settings
     cameras = KnownNoise(sensor_noise(stirring.observed))
     unknown = [one for one in clean if isinstance(one, Recording)]
     needed = settings.budget + CLEAN_RUNS * len(unknown)
     needed += PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
     with run.bank() as bank, ExitStack() as stack:
-        kept = min(len(bank), needed)
-        # more are made where the first that confirm the posterior move it
-        bar = progress_bar("simulating stirs", needed, shown=progress, done=kept, at_least=True)
-        advance = after_first(kept, stack.enter_context(bar))
         compute = replace(compute, batch=settings.batch, bank=bank)
+        budget, known, poured = settings.budget, None, 0
+        if until is not None:  # nothing is stirred before its pours are there
+            known = until.learn(stirring, run.prior, compute, progress)
+            budget, poured = Until(until.tolerance, budget, known), until.pours
+        kept = min(len(bank) - poured, needed)
+        # more are made where the first that confirm the posterior move it
+        bar = progress_bar(
+            "simulating stirs", needed, shown=progress, done=kept, at_least=until is None
+        )
+        advance = after_first(kept, stack.enter_context(bar))
         error, noise = None, None
         # the paper's surrogate has no noise to which an error adds
         if settings.surrogate == "signal":
@@ -216,11 +235,14 @@ def _calibrate(
             run.prior,
             compute,
             settings,
+            budget=budget,
             confirm=0,
             warn=False,
             progress=advance,
             noise=noise,
         )
+        searched = len(fit.history.theta)
+        until_error = None if known is None else known(fit)
         logger.info(
             "posterior so far: %s",
             ", ".join(
@@ -245,7 +267,8 @@ def _calibrate(
         )
         tree = results_tree(sampled, fit, stirring, settings.seed, compute, advance)
     names = tuple(recording_of(one).path.name for one in clean)
-    summary = CalibrationSummary.from_fit(tree, fit, stirring, settings.budget, error, names)
+    summary = CalibrationSummary.from_fit(tree, fit, stirring, searched, error, names)
+    summary = replace(summary, until_error=until_error)
     run.keep("calibrate", tree, run.made_from, summary.to_json())
 
 

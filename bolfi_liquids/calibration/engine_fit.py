@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from ..inference.simulations import Compute
 
 PREDICTIVE_DRAWS = 8
+QUICK_DRAWS = 500  # of each of two chains
 NOT_KEPT = ["log_likelihood", "log_prior", "prior_predictive"]  # tens of megabytes
 THETA_STAR_REPLICATES = 4  # seeds at theta*, for the noise between seeds
 GRID_POINTS = 61  # of either half of an axis of the surface
@@ -91,6 +92,12 @@ def engine_options(stirring: StirSimulator, surrogate: str) -> dict[str, Any]:
         "discrepancy": stirring.discrepancy(),
         **(paper if surrogate == "discrepancy" else {}),
     }
+
+
+def quick_draws(fit: "Fit", seed: int) -> "Dataset":
+    """Draws of a fit's posterior by quadrature, within seconds, shape (chain, draw)."""
+    tree = fit.sample("quadrature", chains=2, draws=QUICK_DRAWS, seed=seed, warn=False)
+    return tree["posterior"].to_dataset()
 
 
 def confirmed(

@@ -126,6 +126,8 @@ class CalibrationSummary(Section):
         confirmed: Whether simulations at posterior draws left the posterior where it was.
         frame_faults: Recordings whose inclination and positions are not told in one frame, and how
             it is mended; see `inputs.frame`.
+        until_error: What the setting `until` limits, of the search's last posterior, before it was
+            checked; None without that setting.
     """
 
     parameters: Mapping[str, ParameterSummary]
@@ -149,6 +151,7 @@ class CalibrationSummary(Section):
     model_error_deg: Number
     clean: tuple[str, ...]
     confirmed: bool
+    until_error: float | None = None
 
     @classmethod
     def from_fit(
@@ -156,7 +159,7 @@ class CalibrationSummary(Section):
         tree: "DataTree",
         fit: "Fit",
         stirring: StirSimulator,
-        budget: int,
+        searched: int,
         error: "ModelError | None",
         clean: tuple[str, ...],
     ) -> Self:
@@ -166,7 +169,7 @@ class CalibrationSummary(Section):
             tree: posterior.nc.
             fit: Of the engine.
             stirring: What was simulated.
-            budget: Simulations of the search.
+            searched: Number of the search's simulations.
             error: Of the simulator, for which the fit allows; None where it allows for none.
             clean: Names of the recordings from which that was learned.
         """
@@ -180,8 +183,8 @@ class CalibrationSummary(Section):
             least_viscosity=float(stirring.least_viscosity),
             best=fit.best,
             closest={name: float(closest[name]) for name in fit.prior.names},
-            n_simulations=budget,
-            n_check_simulations=len(fit.history.theta) - budget + len(replicates),
+            n_simulations=searched,
+            n_check_simulations=len(fit.history.theta) - searched + len(replicates),
             fit_rms_deg=float(np.degrees(rms(misfit))),
             noise_deg=float(np.degrees(irreducible_rms(seen, replicates))),
             emulator_warnings=tuple(fit.warnings),

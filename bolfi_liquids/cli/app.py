@@ -4,13 +4,13 @@ import signal
 import warnings
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from .. import __version__
 from ..errors import InputError
-from ..guide import PAGES, for_terminal
+from ..guide import PAGES, for_terminal, title
 from ..inputs.settings import (
     BaselineSettings,
     CalibrationSettings,
@@ -84,6 +84,7 @@ def _global_options(
     epilog=examples(
         "calibrate stir.nc --budget 20 --out runs/mine",
         "calibrate stir.nc --budget 40 --out runs/mine --resume",
+        "calibrate stir.nc --budget 60 --until spillage=0.02 --out runs/mine",
     )
 )
 @grouped
@@ -109,18 +110,22 @@ def calibrate(  # noqa: PLR0913  an option each
     """Learn a liquid's parameters from recordings of stirs."""
     from ..calibration.calibrate import calibrate as run_calibrate
     from ..inputs.open import open_recordings
+    from ..pouring.known import known
     from ..reporting.warnings import Results
     from ..run.run import check_resumable
 
-    check_needed(ctx, "--pours", "--liquid", "--cups")
+    check_needed(ctx, "--pours", "--liquid")
+    goal = None if settings.until is None else known(settings.until, cups)
+    if goal is None or not goal.pours:
+        check_needed(ctx, "--pours", "--cups")
     if resume:
         check_resumable(out)
     opened, table = open_recordings(recordings), opened_pours(pours, liquid)
-    data = {"pours": table, "cups": cups, "baseline": baseline or ()}
+    made_with = None if table is None else cups
+    data = {"pours": table, "cups": made_with, "baseline": baseline or ()}
+    chosen: dict[str, Any] = {**asdict(settings), "until": goal}
     with printed.complaints_among_results(), compute.arguments() as where:
-        calibration = run_calibrate(
-            opened, out=out, resume=resume, **data, **where, **asdict(settings)
-        )
+        calibration = run_calibrate(opened, out=out, resume=resume, **data, **where, **chosen)
     results = Results.of(calibration.run)
     printed.print_calibration(calibration)
     printed.print_warnings(results)
@@ -340,8 +345,8 @@ def guide(
     """Show a page of the guide: files, priors, messages and more."""
     if page is None:
         width = max(map(len, PAGES))
-        for name, about in PAGES.items():
-            typer.echo(f"{name:{width}}  {about}")
+        for name in PAGES:
+            typer.echo(f"{name:{width}}  {title(name)}")
         typer.echo("read one: bolfi-liquids guide PAGE")
         return
     from rich.console import Console

@@ -9,25 +9,25 @@ from ..errors import InputError
 if TYPE_CHECKING:
     from rich.markdown import Markdown
 
-PAGES = {
-    "recordings": "the recording format, import, resuming, what a run holds",
-    "priors": "choosing a prior and the number of simulations, going on, seeds and noise",
-    "criticism": "finding the effect that the simulator lacks",
-    "simulator": "the inference engine with your own simulator",
-    "program": "a simulator that is a program with a command line and files",
-    "optimiser": "the posterior out of an optimiser's trials",
-    "elfi": "coming from ELFI: notions, and three of its tutorials",
-    "sbi": "coming from sbi: what 10 to 100 simulations give",
-    "cluster": "simulations on Slurm, Dask or another queue; what a kill costs",
-    "methods": "what the engine computes, where it fails, how it was tested",
-    "liquids": "simulated stirs and pours, effects, movies",
-    "robot": "arm, cameras, safety, online calibration",
-    "accuracy": "measured errors of fluid, posterior, pours and criticism",
-    "sbc": "whether intervals hold the truth: simulation-based calibration",
-    "files": "every file that is written: variables, units, attributes, fields",
-    "troubleshooting": "messages by their first line, with cause and cure",
-}
-"""What each page is about, by its name."""
+PAGES = (
+    "simulator",
+    "optimiser",
+    "program",
+    "elfi",
+    "sbi",
+    "cluster",
+    "methods",
+    "recordings",
+    "priors",
+    "criticism",
+    "liquids",
+    "robot",
+    "accuracy",
+    "sbc",
+    "files",
+    "troubleshooting",
+)
+"""Their names, in the order of README and site; a page's title is the question that it answers."""
 
 
 def read_page(name: str) -> str:
@@ -39,6 +39,11 @@ def read_page(name: str) -> str:
     if name not in PAGES:
         raise InputError(f"no page {name!r}", where="guide", fix=f"choose {', '.join(PAGES)}")
     return (files(__name__) / f"{name}.md").read_text(encoding="utf-8")
+
+
+def title(name: str) -> str:
+    """The first line of a page, without its mark."""
+    return read_page(name).partition("\n")[0].removeprefix("# ")
 
 
 def for_terminal(name: str) -> "Markdown":

@@ -138,6 +138,13 @@ class CalibrationSettings:
     """Settings of a calibration, which is decided by them, its recordings and its prior."""
 
     budget: Annotated[Simulations, helped("Simulations of the search.")] = 20
+    until: Annotated[
+        str | None,
+        helped(
+            "End earlier, once the pour (spillage=SHARE) or intervals (intervals=SDS) are known.",
+            metavar="QUANTITY=TOLERANCE",
+        ),
+    ] = None
     batch: Annotated[Count, helped("Simulations run at the same time.")] = 4
     seed: Seed = 0
     surrogate: Annotated[Surrogate, helped("What is emulated, see guide priors.")] = "signal"

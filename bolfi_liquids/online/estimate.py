@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibration.engine_fit import quick_draws
 from ..calibration.stirs import rms, sensor_noise
 from ..calibration.summary import BAD_FIT_RATIO, MIN_NOISE_DEG, ParameterSummary, unexplained
 from ..inputs.frame import frame_faults
@@ -27,8 +28,6 @@ from .settings import OnlineSettings
 if TYPE_CHECKING:
     from ..inference import Bolfi, Prior
     from ..inference.simulations import Job, Simulation
-
-DRAWS_EACH = 500  # of each of two chains
 
 
 class OnlineEstimate(NamedTuple):
@@ -205,9 +204,8 @@ def estimate(
 
     engine = _engine(problem, made, aligned.observed, problem.settings.seed)
     fit = engine.fit(warn=False)  # warnings are among the estimate's complaints
-    seed, (plan,) = problem.settings.seed, problem.stirring.recordings
-    tree = fit.sample("quadrature", chains=2, draws=DRAWS_EACH, seed=seed, warn=False)
-    posterior = tree["posterior"].to_dataset()
+    (plan,) = problem.stirring.recordings
+    posterior = quick_draws(fit, problem.settings.seed)
     status = str(posterior.attrs["status"])
     draws = {name: posterior[name].to_numpy().ravel() for name in problem.prior.names}
     pour = landing_map.best(draws)

@@ -27,8 +27,7 @@ from ..inputs.prior import default_prior
 from ..inputs.recording import planned_recording
 from ..pouring.landing_map import LandingMap, learn_map
 from ..pouring.parcels import Parcels
-from ..pouring.pours import joint_prior, pours_in, whole
-from ..progress import progress_bar
+from ..pouring.pours import pours_of_all
 from ..run.compute import background_process
 from ..run.run import RUN_TOML, alone_in
 from ..simulators import PourSimulator, stir_simulator
@@ -185,12 +184,9 @@ class OnlineCalibration:
                     "holds a run already", where=str(out), fix="choose another directory"
                 )
             (out / LOG).unlink(missing_ok=True)
-            box = whole(joint_prior(prior, (), cups))
-            with (
-                SimulationBank(bank) as kept,
-                progress_bar("pouring", settings.pours, shown=progress) as advance,
-            ):
-                poured = pours_in(box, pours, settings.pours, Compute(bank=kept), advance)
+            with SimulationBank(bank) as kept:
+                compute = Compute(bank=kept)
+                box, poured = pours_of_all(prior, pours, settings.pours, compute, progress=progress)
             learn = partial(learn_map, box, cups, poured)
             # side by side: nothing else is urgent before the robot moves
             batch = max(settings.in_flight, os.cpu_count() or 1)

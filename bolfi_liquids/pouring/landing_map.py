@@ -131,12 +131,23 @@ class LandingMap:
         Args:
             liquids: Posterior draws in no order, name -> (draws,).
         """
-        several = len(next(iter(liquids.values()))) > 1
-        chosen, others = (
-            {name: values[part] for name, values in liquids.items()}
-            for part in (slice(0, BEST_DRAWS, 2), slice(int(several), BEST_DRAWS, 2))
-        )
-        return self.judge(self.surface(chosen).least("mean"), others)
+        choosing, judging = _halves(liquids)
+        return self.judge(self.surface(choosing).least("mean"), judging)
+
+    def regret(self, liquids: Mapping[str, NDArray]) -> NDArray[np.float64]:
+        """Spillage of the action of `best` less that of the action that is best for the liquid at
+        hand, of each draw that did not choose the former, shape (draws,).
+
+        Both are averaged over where the liquid may land, and meet the same error of the map.
+
+        Args:
+            liquids: As for `best`.
+        """
+        choosing, judging = _halves(liquids)
+        best = self.surface(choosing).risk("mean").argmin()
+        spilled = self.surface(judging).spilled
+        of_actions = spilled.reshape(len(spilled), -1)
+        return of_actions[:, best] - of_actions.min(axis=1)
 
     @cached_property
     def error(self) -> NDArray[np.float64]:
@@ -227,6 +238,16 @@ def learn_map(box: Box, cups: "Cups", poured: Poured) -> LandingMap:
     within = Prior({name: dist.Uniform(low, high) for name, low, high in sides})
     learned = emulate(within, _inputs(box, poured.theta), poured.rows, scale())
     return LandingMap(box, cups, poured, learned)
+
+
+def _halves(liquids: Mapping[str, NDArray]) -> tuple[dict[str, NDArray], dict[str, NDArray]]:
+    """Draws that choose an action, and others that judge it; a single draw does both."""
+    several = len(next(iter(liquids.values()))) > 1
+    choosing, judging = (
+        {name: values[part] for name, values in liquids.items()}
+        for part in (slice(0, BEST_DRAWS, 2), slice(int(several), BEST_DRAWS, 2))
+    )
+    return choosing, judging
 
 
 def _inputs(box: Box, theta: Mapping[str, NDArray]) -> dict[str, NDArray[np.float64]]:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..inputs.prior import PARAMETERS
-from ..progress import Advance, silent
+from ..progress import Advance, progress_bar, silent
 from ..run.results import Number
 from ..seeds import Phase, generator, simulation_seeds
 from ..simulators import RATE, BatchOf, PourSimulator
@@ -196,6 +196,15 @@ def pours_in(
         {name: np.concatenate([one.theta[name] for one in found]) for name in box.prior.names},
         np.concatenate([one.rows for one in found]),
     )
+
+
+def pours_of_all(
+    liquid: "Prior", pours: PourSimulator, count: int, compute: "Compute", *, progress: bool
+) -> tuple[Box, Poured]:
+    """Pours of all liquids of a prior, without effects, and whether a bar shows; see `pours_in`."""
+    box = whole(joint_prior(liquid, (), pours.cups))
+    with progress_bar("pouring", count, shown=progress) as advance:
+        return box, pours_in(box, pours, count, compute, advance)
 
 
 def _in_bank(box: Box, pours: PourSimulator, bank: "SimulationBank") -> Iterator[Poured]:

@@ -97,10 +97,21 @@ def calibration_facts(calibration: Calibration) -> Facts:
         "checks": summary.n_check_simulations,
         "confirming": tree["simulations"].sizes["simulation"] - summary.n_simulations,
         "confirmed": summary.confirmed,
+        "until": _until(calibration),
         "seconds": {name: f"{spent:.0f}" for name, spent in vars(summary.seconds).items()},
         "doubts": summary.emulator_warnings,
         "untested": _untested_cells(calibration),
     }
+
+
+def _until(calibration: Calibration) -> Facts | None:
+    """What was known when the search ended; None where it had no goal."""
+    settings, error = calibration.record["settings"], calibration.summary.until_error
+    if error is None:
+        return None
+    pour = settings["until"].startswith("spillage")
+    known = f"{100 * error:.2g}" if pour else f"{error:.2g}"
+    return {"text": settings["until"], "most": settings["budget"], "pour": pour, "known": known}
 
 
 def _untested_cells(calibration: Calibration) -> str | None:

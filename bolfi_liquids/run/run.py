@@ -268,6 +268,12 @@ class Run:
         """Prior of the parameters."""
         return read_prior(self.record["settings"]["prior"])
 
+    @cached_property
+    def settings(self) -> CalibrationSettings:
+        """Settings of the calibration, beside its prior."""
+        held = self.record["settings"].items()
+        return CalibrationSettings(**{name: of for name, of in held if name != "prior"})
+
     def tell_missing_bank(self) -> None:
         """Log that the simulations of a finished calibration were removed, if they were."""
         path = self.path / SIMULATIONS

@@ -134,7 +134,7 @@ class OneByOne:
         The simulator gets Python's own numbers: `random.seed` takes no others.
 
         Raises:
-            Unusable: it returned something else than numbers.
+            ValueError: it returned something else than numbers.
         """
         return np.stack([float64(self.simulate(*job)) for job in jobs(theta, seeds)])
 
@@ -274,7 +274,7 @@ def signals_of(returned: object, n: int, shape: tuple[int, ...] | None) -> np.nd
         shape: Of one signal; None accepts any.
 
     Raises:
-        Unusable: no numbers, or of another shape.
+        ValueError: no numbers, or of another shape.
     """
     signals = float64(returned)
     if signals.shape[:1] != (n,) or shape not in (None, signals.shape[1:]):

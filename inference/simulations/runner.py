@@ -86,7 +86,7 @@ class Runner:
         """Results of all jobs, in order, once all are finished.
 
         Raises:
-            NoSignals: none of the first runs gave a signal of this shape.
+            ValueError: none of the first runs gave a signal of this shape.
             RuntimeError: the executor lost a simulation.
         """
         return [self.result(outcome) for outcome in self.start(batch)]
@@ -274,7 +274,7 @@ def run_missing(
         advance: Called with 1 for each result, in order; those of a batch come together.
 
     Raises:
-        NoSignals: the simulator returned something else than signals for all of the first runs.
+        ValueError: the simulator returned something else than signals for all of the first runs.
     """
     at_once = None if compute.executor is not None else compute.batch
     results = []

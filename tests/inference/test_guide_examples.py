@@ -255,7 +255,7 @@ def test_a_discrepancy_of_your_own(tmp_path, monkeypatch):
 
 
 def test_cheap_runs(tmp_path, monkeypatch):
-    made = run(section("simulator", "Cheap runs help dear ones"), tmp_path, monkeypatch)
+    made = run(section("simulator", "Cheap runs beside expensive ones"), tmp_path, monkeypatch)
 
     def log_likelihood(theta):
         return -0.5 * np.sum(((made["observed"] - made["decay"](theta, None)) / 0.05) ** 2, axis=1)

@@ -14,7 +14,7 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from bolfi_liquids.cli.app import app
-from bolfi_liquids.guide import PAGES, read_page
+from bolfi_liquids.guide import PAGES, read_page, title
 
 LINE = re.compile(r"^- `(?P<name>[^`]+)`(?: \((?P<dims>[^)]*)\))?(?: \[(?P<unit>[^\]]+)\])?:")
 BRACES = re.compile(r"\{([^{}]*)\}")
@@ -124,13 +124,12 @@ def test_run_directory_and_run_toml_are_told(calibration, pour):
 
 def test_fields_of_rig_and_cups_are_those_of_their_types():
     sys.path.append(str(Path(__file__).parent))
-    from field_tables import section, tables
+    from field_lists import lists, section
 
     page = read_page("files")
-    for name, table in tables(page).items():
-        assert table in section(page, name), "run tests/bolfi_liquids/guide/field_tables.py"
-        for row in table.splitlines()[2:]:
-            assert row.split(" | ")[2].strip(), row  # its meaning
+    for name, fields in lists(page).items():
+        assert fields in section(page, name), "run tests/bolfi_liquids/guide/field_lists.py"
+        assert ":  (" not in fields  # each has its meaning
 
 
 def test_columns_of_a_session_are_told():
@@ -162,8 +161,16 @@ def test_pages_are_installed_and_printed():
         assert (files("bolfi_liquids.guide") / f"{page}.md").is_file()
         result = CliRunner().invoke(app, ["guide", page], env={"COLUMNS": "80"})
         assert result.exit_code == 0
-        assert read_page(page).splitlines()[0].removeprefix("# ") in result.stdout
+        assert title(page) in result.stdout
         assert max(map(len, result.stdout.splitlines())) <= 80, page
+
+
+def test_readme_and_site_list_the_pages():
+    root = Path(__file__).parents[3]
+    readme, site = ((root / at).read_text("utf-8") for at in ("README.md", "docs/index.md"))
+    rows = re.findall(r"^\| \[(\w+)\]\(bolfi_liquids/guide/\1\.md\) \| (.*) \|$", readme, re.M)
+    assert rows == [(page, title(page)) for page in PAGES]
+    assert re.findall(r"^\.\./bolfi_liquids/guide/(\w+)$", site, re.M) == list(PAGES)
 
 
 def test_no_field_of_a_table_is_cut():

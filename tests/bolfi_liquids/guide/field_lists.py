@@ -1,11 +1,11 @@
-"""The tables of rig.toml and cups.toml in the guide, from the types that read these files.
+"""The lists of rig.toml and cups.toml in the guide, from the types that read these files.
 
-`python tests/bolfi_liquids/guide/field_tables.py` writes them again; meanings stay as the page has
+`python tests/bolfi_liquids/guide/field_lists.py` writes them again; meanings stay as the page has
 them, and everything else follows the types.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib.resources import files
 from pathlib import Path
 from types import NoneType
@@ -18,17 +18,13 @@ from pydantic import BaseModel
 from bolfi_liquids.inputs.cups import bundled_cups
 
 PAGE = Path(str(files("bolfi_liquids.guide"))) / "files.md"
-HEAD = "| field | unit | meaning | limits | if left out | example |\n|---|---|---|---|---|---|\n"
-ROW = re.compile(r"^\| `([\w.]+)` \|([^|]*)\|([^|]*)\|.*\|$", re.M)
+LINE = re.compile(r"^- `([\w.]+)`(?: \[[^]]*\])?: (.+?) \([^()]*\)\n", re.M)
 FILES = {"rig.toml": (Rig, bundled_rig), "cups.toml": (Cups, bundled_cups)}
 
 
-def tables(page: str) -> dict[str, str]:
-    """The table of each file, with the meanings of a page."""
-    return {
-        name: HEAD + "".join(_rows(model, read(), name, page))
-        for name, (model, read) in FILES.items()
-    }
+def lists(page: str) -> dict[str, str]:
+    """The fields of each file, with the meanings of a page."""
+    return {name: "".join(_lines(*FILES[name], section(page, name))) for name in FILES}
 
 
 def section(page: str, name: str) -> str:
@@ -40,27 +36,20 @@ def _headings(page: str) -> list[str]:
     return re.findall(r"^## (.*)$", page, flags=re.M)
 
 
-def _rows(model: type[BaseModel], example: BaseModel, name: str, page: str) -> Iterator[str]:
-    meanings = {field: told.strip() for field, _, told in ROW.findall(section(page, name))}
-    for field, kind, metadata, default, value in _fields(model, example):
+def _lines(model: type[BaseModel], read: Callable[[], BaseModel], part: str) -> Iterator[str]:
+    meanings = dict(LINE.findall(part))
+    for field, kind, metadata, default, value in _fields(model, read()):
         limits = list(dict.fromkeys(_limits(kind, metadata)))
-        units = dict.fromkeys(unit for unit, _ in limits if unit)
-        ends = "; ".join(end for _, end in limits)
-        cells = (
-            f"`{field}`",
-            ", ".join(units),
-            meanings.get(field, ""),
-            ends,
-            default,
-            _written(value),
-        )
-        yield f"| {' | '.join(cells)} |\n"
+        units = ", ".join(dict.fromkeys(unit for unit, _ in limits if unit))
+        ends = (end for _, end in limits)
+        about = "; ".join([*ends, default or f"such as {_written(value)}"])
+        yield f"- `{field}`{units and f' [{units}]'}: {meanings.get(field, '')} ({about})\n"
 
 
 def _fields(
     model: type[BaseModel], example: BaseModel, way: str = ""
 ) -> Iterator[tuple[str, Any, list[Any], str, Any]]:
-    """Dotted name, type, metadata, default and example of each field."""
+    """Dotted name, type, metadata, what is taken without it ("": it is needed), and example."""
     for name, field in model.model_fields.items():
         kind, value = field.annotation, getattr(example, name)
         if isinstance(value, tuple) and isinstance(value[0], BaseModel):
@@ -68,7 +57,7 @@ def _fields(
         if isinstance(value, BaseModel):
             yield from _fields(type(value), value, f"{way}{name}.")
             continue
-        default = "needed" if field.is_required() else _written(field.default)
+        default = "" if field.is_required() else f"by default {_written(field.default)}"
         yield f"{way}{name}", kind, field.metadata, default, value
 
 
@@ -93,16 +82,15 @@ def _written(value: Any) -> str:
         return f'"{value}"'
     if isinstance(value, tuple):
         return f"[{', '.join(map(_written, value))}]"
-    return "" if value is None else f"{value:.6g}"
+    return "none" if value is None else f"{value:.6g}"
 
 
 def write() -> None:
-    """Put the tables into the page."""
+    """Put the lists into the page."""
     page = PAGE.read_text(encoding="utf-8")
-    for name, table in tables(page).items():
+    for name, lines in lists(page).items():
         part = section(page, name)
-        before = part.split("| field |")[0]
-        page = page.replace(part, f"{before}{table}\n")
+        page = page.replace(part, f"{part.partition('\n- ')[0]}\n{lines}\n")
     PAGE.write_text(page, encoding="utf-8")
 
 

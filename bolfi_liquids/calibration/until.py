@@ -1,0 +1,57 @@
+"""What shall be known for a search to end before its budget."""
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from ..errors import Argument, InputError
+from ..inputs.settings import MIN_SIMULATIONS, CalibrationSettings
+
+if TYPE_CHECKING:
+    from ..inference import Fit, Prior
+    from ..inference.simulations import Compute
+    from ..simulators import StirSimulator
+
+
+class Goal(NamedTuple):
+    """What shall be known, and how well; see `pouring.known.known`.
+
+    Attributes:
+        text: QUANTITY=TOLERANCE, for run.toml.
+        tolerance: Error at which the search ends.
+        learn: Makes the error of a fit, after the pours that it rests on; the last argument is
+            whether to show bars.
+        pours: Number of these pours.
+        scene: Everything that fixes them, for run.toml.
+    """
+
+    text: str
+    tolerance: float
+    learn: "Callable[[StirSimulator, Prior, Compute, bool], Callable[[Fit], float]]"
+    pours: int = 0
+    scene: Mapping[str, Any] = {}
+
+
+def check_goal(goal: object, settings: CalibrationSettings, parameters: int) -> None:
+    """Refuse what is no goal, and a budget that is spent before it could end the search.
+
+    Args:
+        goal: Of a calibration; None is none.
+        settings: Its others.
+        parameters: Number of the prior.
+    """
+    from ..inference.sobol import start_size
+    from ..inference.until import soonest
+
+    if goal is None:
+        return
+    if not isinstance(goal, Goal):
+        fix = 'give bolfi_liquids.known("spillage=0.02"), or another tolerance'
+        raise InputError(f"{goal!r:.80}", where=Argument("until"), fix=fix)
+    start = MIN_SIMULATIONS if settings.surrogate == "discrepancy" else start_size(parameters)
+    least = soonest(start, settings.batch)
+    if settings.budget <= least:
+        raise InputError(
+            f"{settings.budget} simulations, and `until` may end the search after {least}",
+            where=Argument("budget"),
+            fix=f"give more than {least}, or leave `until` out",
+        )
