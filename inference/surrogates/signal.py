@@ -468,8 +468,9 @@ class SignalFamily(Family):
             the simulator errs or the noise is larger; its size is integrated out. 0 for never.
         components: At most.
         predicted: Share of a component's variance that the parameters must predict where its
-            run is left out; what they predict less counts as run-to-run noise. None emulates
-            every component, and takes some noise for structure if the simulator is noisy.
+            run is left out; what they predict less counts as run-to-run noise, unless repeated
+            runs agree. None emulates every component, and takes some noise for structure if the
+            simulator is noisy.
         discrepancy: As in `DiscrepancyFamily`; it only ranks simulations and finds outputs that
             blew up.
     """
