@@ -85,7 +85,7 @@ def narrow(theta, seeds):
 @pytest.mark.parametrize(("family", "budget"), [("signal", 20), ("discrepancy", 40)])
 def test_a_fault_in_a_quarter_of_the_posterior_is_found(family, budget):
     """There the output is that of a rate two sds off. Of 12 draws none may lie there, once in 30
-    times."""
+    times; without a fault the posterior moves too far once in 20."""
     prior = inference.Prior({"height": dist.Uniform(1, 6), "rate": dist.Uniform(0.2, 3)})
     options = {"noise": 0.2} if family == "signal" else {"surrogate": family}
     truth, found = {"height": np.array([3.0]), "rate": np.array([0.8])}, {0.0: 0, 2.0: 0}
@@ -106,7 +106,7 @@ def test_a_fault_in_a_quarter_of_the_posterior_is_found(family, budget):
             faulty = drawn | {"rate": drawn["rate"] + shift * rate.std() * there}
             engine.tell(drawn, decay(faulty, [0]))
             found[shift] += not engine.fit(warn=False).confirmed
-    assert found[0.0] == 0 and found[2.0] >= 5
+    assert found[0.0] <= 1 and found[2.0] >= 5
 
 
 def test_runs_at_draws_of_the_posterior_confirm_it_or_move_it():
@@ -183,7 +183,7 @@ def test_what_a_sum_of_squares_cannot_see_is_said():
 
 
 def test_noise_that_repeated_runs_do_not_show_is_doubt():
-    """A wave of many cycles, of which the components make half: no run has any noise."""
+    """A wave of many cycles, of which four components make a part: no run has any noise."""
     time = np.linspace(0.0, 20.0, 80)
     prior = inference.Prior({"w": dist.Uniform(0.5, 5.0)})
     observed = np.sin(2.3 * time) + 0.3 * np.random.default_rng(0).normal(size=80)
@@ -192,7 +192,7 @@ def test_noise_that_repeated_runs_do_not_show_is_doubt():
         return np.sin(theta["w"][:, None] * time)
 
     options = {"budget": 16, "noise": 0.3, "warn": False, "progress": False}
-    fit = inference.fit(simulate, prior, observed, **options)
+    fit = inference.fit(simulate, prior, observed, components=4, **options)
     latent = fit.learned.log_likelihood._replace(doubt=np.zeros(()))
     gap = [
         np.ptp(likelihood(prior.to_unit({"w": np.array([2.3, 3.0])})))

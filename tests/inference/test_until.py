@@ -71,7 +71,9 @@ def test_what_components_leave_is_no_noise_where_repeated_runs_agree():
     truth = {"height": np.array([2.0]), "rate": np.array([0.7])}
     observed = waves(truth, None)[0] + NOISE * np.random.default_rng(0).normal(size=TIMES.size)
     fit = inference.fit(
-        waves, PRIOR, observed, noise=NOISE, budget=40, confirm=0, warn=False, progress=False
+        *(waves, PRIOR, observed),
+        **{"noise": NOISE, "components": 3, "budget": 40},
+        **{"confirm": 0, "warn": False, "progress": False},
     )
     u = np.random.default_rng(0).random((200_000, 2)) * (0.2, 0.02) + (0.4, 0.305)
     missed = waves(PRIOR.from_unit(u), None) - observed
