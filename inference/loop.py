@@ -196,7 +196,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
     require(budget + told >= engine.initial, "budget", due, budget, cure=cure)
     with ExitStack() as stack:
         compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
-        bar = progress_bar("simulations", budget + confirm, shown=progress, at_least=confirm > 0)
+        bound = "at most" if until else "at least" if confirm else ""
+        bar = progress_bar("simulations", budget + confirm, shown=progress, bound=bound)
         advance = stack.enter_context(bar)
         runner = stack.enter_context(
             Runner(simulator, compute, shape=engine.expected_shape, identity=identity)

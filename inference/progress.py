@@ -15,14 +15,15 @@ LINES_APART = 60.0  # s between lines of one phase, where there is no terminal
 
 
 @contextmanager
-def phases(*, shown: bool, at_least: bool = False) -> Iterator[Report]:
+def phases(*, shown: bool, bound: str = "") -> Iterator[Report]:
     """A bar for the phase that long work is in.
 
     Without a terminal: a line for each phase, and another every minute (`pouring, 12 of 64`).
 
     Args:
         shown: False for silence.
-        at_least: Whether a phase may turn out to need more steps than it begins with.
+        bound: "at least" or "at most", where a phase may turn out to need more or fewer steps than
+            it begins with.
     """
     if not shown:
         yield lambda phase, finished, total: None
@@ -31,7 +32,7 @@ def phases(*, shown: bool, at_least: bool = False) -> Iterator[Report]:
 
     console = Console(stderr=True)
     current, done = "", 0
-    lines = _lines(console, "to run at least" if at_least else "to run")
+    lines = _lines(console, f"to run {bound}".strip())
     with _bar(console) if console.is_terminal else lines as show:
 
         def report(phase: str, finished: int, total: int) -> None:
@@ -50,7 +51,7 @@ def progress_bar(
     *,
     shown: bool | Callable[[int], object],
     done: int = 0,
-    at_least: bool = False,
+    bound: str = "",
 ) -> Iterator[Advance]:
     """The same for work of one phase; the yielded function moves the bar on.
 
@@ -59,12 +60,12 @@ def progress_bar(
         total: Steps in all.
         shown: False for silence; a function is called with the steps instead.
         done: Steps made before.
-        at_least: Whether more steps may turn out to be needed.
+        bound: See `phases`.
     """
     if not isinstance(shown, bool):
         yield shown
         return
-    with phases(shown=shown, at_least=at_least) as report:
+    with phases(shown=shown, bound=bound) as report:
         report(task, done, total)
         yield lambda steps: report(task, steps, total)
 

@@ -56,7 +56,7 @@ def checked_budget(budget: object, least: int) -> tuple[int, Until | None]:
     if isinstance(until, Until):
         return until.most, until
     due = f'be "auto", an Until or an integer from {least} to {MOST_SIMULATIONS}'
-    require(not isinstance(budget, str), "budget", due, budget)
+    require(hasattr(budget, "__index__"), "budget", due, budget)
     return checked_integer("budget", budget, least, MOST_SIMULATIONS), None
 
 

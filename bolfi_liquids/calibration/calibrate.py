@@ -65,6 +65,9 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
+ENDS = "settings.budget", "settings.until", "simulator.pour"
+"""Fields of run.toml that say nothing but when the search ends."""
+
 
 def calibrate(  # noqa: PLR0913  the one call that most users make
     recordings: Source | Sequence[Source],
@@ -92,8 +95,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
 
     Everything is kept in `out` as it is finished, so an interrupted call can be repeated with
     `resume`: it gives the same result, and repeats no finished simulation. The same call on a
-    finished run only opens it. With a larger budget it goes on from there; what followed from
-    fewer simulations does not count any more.
+    finished run only opens it. With a larger budget, or another `until`, it goes on from there;
+    what followed from fewer simulations does not count any more.
 
     Args:
         recordings: One or several of one liquid, opened or as paths. Their discrepancies are
@@ -120,8 +123,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         sampler: "nuts" or "emcee".
         chains: Number of the sampler's chains.
         draws: Number of draws that each chain keeps.
-        resume: Whether `out` may hold a run of the same settings, but for a smaller budget, to go
-            on with.
+        resume: Whether `out` may hold a run of the same settings, but for a smaller budget and
+            `until`, to go on with.
         executor, timeout: Where simulations run: a pool of processes, a Dask client or the address
             of a Dask scheduler, whose workers have one thread each; None is this process. The
             result has the same bits. And seconds that one simulation may take; one that takes
@@ -159,7 +162,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     record = run_record(settings, prior, stirring, given, until)
     with (
         open_compute(executor, timeout) as compute,
-        Run.begun(path, record, resume=resume, growing="settings.budget") as run,
+        Run.begun(path, record, resume=resume, ends=ENDS) as run,
     ):
         run.keep_recordings(stirring.recordings)
         if table is not None:
@@ -219,9 +222,8 @@ def _calibrate(
             budget, poured = Until(until.tolerance, budget, known), until.pours
         kept = min(len(bank) - poured, needed)
         # more are made where the first that confirm the posterior move it
-        bar = progress_bar(
-            "simulating stirs", needed, shown=progress, done=kept, at_least=until is None
-        )
+        bound = "at most" if until else "at least"
+        bar = progress_bar("simulating stirs", needed, shown=progress, done=kept, bound=bound)
         advance = after_first(kept, stack.enter_context(bar))
         error, noise = None, None
         # the paper's surrogate has no noise to which an error adds

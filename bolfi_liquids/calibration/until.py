@@ -45,13 +45,14 @@ def check_goal(goal: object, settings: CalibrationSettings, parameters: int) -> 
     if goal is None:
         return
     if not isinstance(goal, Goal):
-        fix = 'give bolfi_liquids.known("spillage=0.02"), or another tolerance'
+        given = goal if isinstance(goal, str) else "spillage=0.02"
+        fix = f'give bolfi_liquids.known("{given}")'
         raise InputError(f"{goal!r:.80}", where=Argument("until"), fix=fix)
     start = MIN_SIMULATIONS if settings.surrogate == "discrepancy" else start_size(parameters)
     least = soonest(start, settings.batch)
     if settings.budget <= least:
         raise InputError(
-            f"{settings.budget} simulations, and `until` may end the search after {least}",
+            f"{settings.budget} simulations, and `until` takes {least} at least",
             where=Argument("budget"),
             fix=f"give more than {least}, or leave `until` out",
         )

@@ -109,9 +109,14 @@ def _until(calibration: Calibration) -> Facts | None:
     settings, error = calibration.record["settings"], calibration.summary.until_error
     if error is None:
         return None
-    pour = settings["until"].startswith("spillage")
+    quantity, tolerance = settings["until"].split("=")
+    pour = quantity == "spillage"
     known = f"{100 * error:.2g}" if pour else f"{error:.2g}"
-    return {"text": settings["until"], "most": settings["budget"], "pour": pour, "known": known}
+    return {
+        **{"text": settings["until"], "most": settings["budget"], "pour": pour, "known": known},
+        "early": calibration.summary.n_simulations < settings["budget"],
+        "reached": error <= float(tolerance),
+    }
 
 
 def _untested_cells(calibration: Calibration) -> str | None:

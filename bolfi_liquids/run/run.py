@@ -169,7 +169,7 @@ class Run:
     @classmethod
     @contextmanager
     def begun(
-        cls, path: Path, record: Mapping[str, Any], *, resume: bool, growing: str = ""
+        cls, path: Path, record: Mapping[str, Any], *, resume: bool, ends: tuple[str, ...] = ()
     ) -> "Iterator[Run]":
         """Lock a new run, or one with the same settings.
 
@@ -180,8 +180,9 @@ class Run:
             path: The directory; made if missing.
             record: Content of run.toml.
             resume: Whether the directory may hold a run, to go on with.
-            growing: Field of `record`, if any, that may exceed the held value. run.toml changes
-                with the next result; until then the former ones are current.
+            ends: Fields of `record` that say nothing but when the work ends. They may change, and
+                numbers among them grow. run.toml changes with the next result; until then the
+                former ones are current.
 
         Raises:
             InputError: Another command works there; the directory holds a run and `resume` is
@@ -193,7 +194,7 @@ class Run:
                 if not resume:
                     fix = "give `resume` to go on with it, or another `out`"
                     raise InputError("holds a run already", where=str(path), fix=fix)
-                run = cls(path, cls.open(path)._continued(record, growing))
+                run = cls(path, cls.open(path)._continued(record, ends))
                 run.write_summary()  # a killed command may not have come to it
                 run.tell_missing_bank()
             else:
@@ -202,16 +203,15 @@ class Run:
                 run = cls(path, record)
             yield run
 
-    def _continued(self, wanted: Mapping[str, Any], growing: str) -> Mapping[str, Any]:
-        """The held record, or the wanted one with the held date where the run grows.
+    def _continued(self, wanted: Mapping[str, Any], ends: tuple[str, ...]) -> Mapping[str, Any]:
+        """The held record, or the wanted one with the held date where its ends are others.
 
         Raises:
             InputError: They differ otherwise; the message names the first field.
         """
         differing = _differences(self.record, wanted)
-        held, asked = differing.get(growing, (None, None))
-        if grows := isinstance(held, int) and isinstance(asked, int) and asked > held:
-            del differing[growing]
+        others = {field for field, pair in differing.items() if _goes_on(field, pair, ends)}
+        differing = {field: pair for field, pair in differing.items() if field not in others}
         if differing:
             field, (held, asked) = next(iter(differing.items()))
             if field.startswith("inputs."):
@@ -219,14 +219,14 @@ class Run:
                 fix = f"give those that {RUN_TOML} names under files, unchanged, or another `out`"
                 raise InputError(what, where=str(self.path), fix=fix)
             own = f"resume with the run's own value of `{field.rpartition('.')[2]}`"
-            larger = " or a larger one" if field == growing else ""
+            larger = " or a larger one" if field in ends else ""
             raise InputError(
                 f"{field} is {held!r:.80} in the run, but {asked!r:.80} was asked",
                 where=str(self.path / RUN_TOML),
                 fix=f"{own}{larger}, or choose another `out`",
             )
         first = {"created": self.record["created"]} if "created" in self.record else {}
-        return {**wanted, **first} if grows else self.record
+        return {**wanted, **first} if others else self.record
 
     @property
     def _copies(self) -> list[Path]:
@@ -568,6 +568,13 @@ def _check_no_results(path: Path) -> None:
 
 def _write(path: Path, record: Mapping[str, Any]) -> None:
     write_text(path / RUN_TOML, tomli_w.dumps(record))
+
+
+def _goes_on(field: str, values: tuple[Any, Any], ends: tuple[str, ...]) -> bool:
+    """Whether a field that has another value lets a run go on: one of `ends`, and no smaller."""
+    held, asked = values
+    smaller = isinstance(held, int) and isinstance(asked, int) and asked < held
+    return field.startswith(ends) and not smaller if ends else False
 
 
 def _differences(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:

@@ -33,8 +33,8 @@ FEW_NUMBERS = (
     "the posterior's width rests on a guess; give noise="
 )
 DOUBTED = (
-    "the posterior is much wider than the data make it: what a simulation would give is not known "
-    "well enough in places, which counts as agreement; simulate more, or narrow the prior"
+    "the posterior is much wider than the data make it: in places the emulator does not know what "
+    "a simulation would give, so that nothing there disagrees; simulate more, or narrow the prior"
 )
 UNCONFIRMED = (
     "runs at draws of the posterior moved it, so that it is not known yet: simulate more, or "

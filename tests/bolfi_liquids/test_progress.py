@@ -50,7 +50,7 @@ def test_phases_take_over_a_terminal_only_where_they_are_shown(
 
 def test_without_a_terminal_a_long_phase_says_how_far_it_is(capsys, monkeypatch):
     monkeypatch.setattr(progress, "LINES_APART", 0.0)
-    with progress_bar("stirs", 4, shown=True, done=1, at_least=True) as advance:
+    with progress_bar("stirs", 4, shown=True, done=1, bound="at least") as advance:
         for _ in range(4):
             advance(1)
     told = capsys.readouterr().err.splitlines()

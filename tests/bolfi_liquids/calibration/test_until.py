@@ -48,8 +48,8 @@ def test_it_ends_early_as_a_smaller_budget_would_also_when_resumed(short_recordi
     told = calibration_facts(early)["until"]
     assert (told["known"], told["most"]) == ("0.12", 40)
     assert calibration_facts(plain)["until"] is None
-    with pytest.raises(InputError, match=r"settings\.until is 'intervals=0.25' in the run"):
-        calibrate("early", budget=40, resume=True)
+    whole = calibrate("early", budget=40, resume=True)
+    assert whole.summary.n_simulations == 40 and "until" not in whole.record["settings"]
 
 
 @pytest.mark.parametrize(

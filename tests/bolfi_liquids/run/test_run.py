@@ -40,8 +40,8 @@ RECORD = {
 }
 
 
-def begin(path, record=RECORD, *, resume=False, growing=""):
-    with Run.begun(path, record, resume=resume, growing=growing) as run:
+def begin(path, record=RECORD, *, resume=False, ends=()):
+    with Run.begun(path, record, resume=resume, ends=ends) as run:
         return run
 
 
@@ -90,19 +90,19 @@ def test_dates_and_versions_may_be_others(tmp_path):
 
 def test_a_run_grows_in_the_field_that_may_grow(tmp_path):
     begin(tmp_path)
-    larger, growing = changed("settings", budget=30), "settings.budget"
+    larger, ends = changed("settings", budget=30), ("settings.budget",)
     with pytest.raises(InputError, match=r"settings\.budget is 20 in the run, but 30"):
         begin(tmp_path, larger, resume=True)
-    grown = begin(tmp_path, larger, resume=True, growing=growing)
+    grown = begin(tmp_path, larger, resume=True, ends=ends)
     assert grown.record == larger
     assert Run.open(tmp_path).record == RECORD  # as long as there is no larger result
     with pytest.raises(InputError):
-        begin(tmp_path, changed("settings", budget=40, seed=1), resume=True, growing=growing)
+        begin(tmp_path, changed("settings", budget=40, seed=1), resume=True, ends=ends)
     draws = DataTree.from_dict({"/posterior": Dataset({"x": ("draw", [1.0])})})
     grown.keep("calibrate", draws, grown.made_from, {})
     assert Run.open(tmp_path).record == larger
     with pytest.raises(InputError):
-        begin(tmp_path, RECORD, resume=True, growing=growing)
+        begin(tmp_path, RECORD, resume=True, ends=ends)
 
 
 def test_results_without_settings_are_left_alone(tmp_path):
