@@ -25,9 +25,11 @@ from .squared_difference import independent
 
 EXPLAINED_SHARE = 0.9995  # of the variance, to be explained by components
 EXPLAINED_IF_EXACT = 0.99999  # the same of a simulator that makes no noise
+SMALL_SHARE = 0.25  # of the variance, that is emulated though no parameter predicts it
 PREDICTED_SHARE = 0.3  # see `_predicted`
 PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
 MAX_ABSORBED_SHARE = 0.9  # of a score that may count as its own run's noise
+FIRST_REPLICATES = 2  # replicates to begin with, which tell a deterministic simulator
 EQUAL_RUNS_TOLERANCE = 1e-9  # relative difference up to which two runs count as equal
 TOO_SMALL = 0.01  # probability that repeated runs differ by less than they may
 # of run-to-run noise whose size depends on the parameters
@@ -330,6 +332,12 @@ def differing(u: np.ndarray, outputs: np.ndarray) -> np.ndarray:
     return (differ > EQUAL_RUNS_TOLERANCE * outputs.std(0)).any(1)
 
 
+def deterministic(u: np.ndarray, outputs: np.ndarray) -> bool:
+    """Whether FIRST_REPLICATES or more repeated runs agree."""
+    differ = differing(u, outputs)
+    return len(differ) >= FIRST_REPLICATES and not differ.any()
+
+
 def emulate(
     u: np.ndarray,
     outputs: np.ndarray,
@@ -362,8 +370,7 @@ def _learned(
     """Components and hyperparameters of outputs known.y [m, n], the run-to-run noise being of a
     known size."""
     outputs, n, spread = known.y.T, len(known.u), run_spread(size, known.u)
-    scale, differ = units(outputs), differing(known.u, outputs)
-    exact = len(differ) > 0 and not differ.any()
+    scale, exact = units(outputs), deterministic(known.u, outputs)
     share = EXPLAINED_IF_EXACT if exact else EXPLAINED_SHARE
     varied = float(np.mean(np.var(outputs, axis=0) / scale**2))
     share = max(share, 1.0 - limits.left / varied) if varied else share
@@ -373,10 +380,13 @@ def _learned(
     if limits.cheap is not None:
         u, made = limits.cheap
         hyper, prior = _helped(hyper, data, CheapRuns(u, basis.scores(made)))
-    if limits.predicted is not None and not exact:
+    if limits.predicted is not None:
         order, kept = _predicted(condition(hyper, data, prior), limits.predicted)
-        basis, hyper = basis.only(kept), Hyper(*(part[order] for part in hyper))
-        prior = prior and prior.only(order)
+        # what is not predicted is no noise where runs agree; much of it means a chaotic simulator
+        small = basis.squared[~kept].sum() <= SMALL_SHARE * basis.squared.sum()
+        if not (exact and small):
+            basis, hyper = basis.only(kept), Hyper(*(part[order] for part in hyper))
+            prior = prior and prior.only(order)
     remainder = _left(basis, outputs, spread)
     excess = _absorbed_noise(basis, np.exp(2.0 * hyper.log_noise), remainder, n)
     smaller = np.log1p(-excess)

@@ -469,8 +469,8 @@ class SignalFamily(Family):
         components: At most.
         predicted: Share of a component's variance that the parameters must predict where its
             run is left out; what they predict less counts as run-to-run noise, unless repeated
-            runs agree. None emulates every component, and takes some noise for structure if the
-            simulator is noisy.
+            runs agree and it is little. None emulates every component, and takes some noise for
+            structure if the simulator is noisy.
         discrepancy: As in `DiscrepancyFamily`; it only ranks simulations and finds outputs that
             blew up.
     """
