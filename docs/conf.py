@@ -53,7 +53,7 @@ nb_execution_mode = "force" if os.environ.get("NOTEBOOKS") else "off"
 nb_execution_excludepatterns = ["*paper_figures*"]  # it shows what hours of `make paper` drew
 nb_execution_timeout = -1
 nb_execution_raise_on_error = True
-os.environ["PYTHONWARNINGS"] = "ignore:IProgress not found"  # tqdm's, in each kernel
+os.environ.setdefault("PYTHONWARNINGS", "ignore:IProgress not found")  # tqdm's, in each kernel
 nb_ipywidgets_js = {}  # they would come from elsewhere
 
 add_module_names = False
@@ -96,7 +96,7 @@ def draw_gallery(app):
 
 
 def adapt(app, docname, source):
-    """Where the terminal is told the command that shows a page, the site links the page."""
+    """A guide page's commands that show a page or a template become links; README is "Overview"."""
     if docname.startswith(GUIDE):
         source[0] = re.sub(f"`{COMMAND.pattern}`", r"[\g<0>](\1.md)", source[0])
         source[0] = source[0].replace(TEMPLATE, f"[{TEMPLATE}](/docs/rig.md)")

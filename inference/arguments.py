@@ -231,8 +231,8 @@ def check_choice(name: str, value: object, choices: tuple[str | None, ...]) -> N
 
 
 def check_runs(name: str, runs: Any, *lengths: int) -> None:
-    """Raise ValueError unless `runs` is None, or the first of theta, signals, seeds and errors, so
-    many of them."""
+    """Raise ValueError unless `runs` is None or a tuple (theta, signals, seeds, errors), cut to one
+    of these lengths."""
     held = isinstance(runs, tuple | list) and len(runs) in lengths and is_table(runs[0])
     parts = "theta", "signals", "seeds", "errors"
     forms = " or ".join(f"({', '.join(parts[:length])})" for length in lengths)

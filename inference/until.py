@@ -78,7 +78,7 @@ def enough(engine: Bolfi, until: Until | None) -> Callable[[], bool]:
 
 
 def soonest(start: int, batch: int) -> int:
-    """Simulations after which a search may end at the earliest.
+    """Simulations after which a search that runs in rounds may end at the earliest.
 
     Args:
         start: In the start design.

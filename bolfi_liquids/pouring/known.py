@@ -53,6 +53,9 @@ def known(until: str, cups: "Cups | str | Path | None" = None) -> Goal:
         raise InputError(f"{until!r:.80}", where=Argument("until"), fix=fix)
     text = f"{quantity}={tolerance}"
     if quantity == "intervals":
+        if cups is not None:
+            fix = "give `cups` with spillage=SHARE, or leave them out"
+            raise InputError("intervals need none", where=Argument("cups"), fix=fix)
         return Goal(text, tolerance, lambda *_: lambda fit: fit.interval_error())
     cups = cups_of(cups)
     scene = {"pour": {**cups.settings(), "pours": PRIOR_POURS}}

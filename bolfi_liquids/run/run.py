@@ -25,6 +25,7 @@ import tomli_w
 
 from ..errors import Argument, InputError
 from ..files import as_path, existing_file, write_text, write_whole
+from ..inputs.cups import bundled_cups, kept_cups
 from ..inputs.open import read_fields
 from ..inputs.prior import read_prior
 from ..inputs.recording import Recording, as_recording
@@ -375,7 +376,9 @@ class Run:
             clean = (
                 ["--baseline", "CLEAN..."] if "baseline" in self.record.get("inputs", {}) else []
             )
-            return self._calibrate_again(*clean, "--out", self.path, "--resume")
+            pour = self.record.get("simulator", {}).get("pour")
+            cups = ["--cups", "CUPS"] if pour and kept_cups(pour) != bundled_cups() else []
+            return self._calibrate_again(*clean, *cups, "--out", self.path, "--resume")
         try:
             made = json.loads(read_result(self.path / RESULTS[step]).attrs["made_from"])
         except (OSError, ValueError):

@@ -24,7 +24,7 @@ from .job import OneByOne
 FILES = frozenset({"in", "out"})
 TAIL = 5  # lines of stderr that an error holds
 TAIL_LETTERS = 1000
-GUARD = "sh", "-c", "read _; kill -9 0"  # 0 is its own group
+GUARD = "/bin/sh", "-c", "read _; kill -9 0"  # 0 is its own group
 
 _ends: ContextVar[float | None] = ContextVar("ends", default=None)  # of time.monotonic
 
@@ -42,8 +42,8 @@ class Program(OneByOne):
     Each run has an empty directory of its own, in which it starts, and which is removed when it
     has ended. A run fails if it ends with another exit code than 0, or if its output is missing
     or cannot be read; the error holds the last lines of its stderr. With `fit(timeout=)` a run
-    that is overdue is killed, with all processes of its group, and so it is where Python itself is
-    killed. Runs share nothing, so that threads suffice to make several at a time:
+    that is overdue is killed, with all processes of its group, and so it is where the process that
+    waits for it is killed. Runs share nothing, so that threads suffice to make several at a time:
     `fit(..., executor=ThreadPoolExecutor(4))`.
 
     Args:
@@ -162,11 +162,10 @@ def _execute(words: Sequence[str], directory: Path) -> None:
         TimeoutError: it took longer than `_limited` allows.
     """
     ends = _ends.get()
-    guarding = subprocess.Popen(GUARD, stdin=subprocess.PIPE, process_group=0)
     with (
+        subprocess.Popen(GUARD, stdin=subprocess.PIPE, process_group=0) as guard,
         open(directory / "stdout", "wb") as out,
         open(directory / "stderr", "wb") as err,
-        guarding as guard,
     ):
         program = subprocess.Popen(
             words,
