@@ -17,6 +17,7 @@ PAGES = (
     "sbi",
     "cluster",
     "methods",
+    "benchmark",
     "recordings",
     "priors",
     "criticism",

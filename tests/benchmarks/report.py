@@ -15,7 +15,7 @@ COLUMNS = {"total_variation": ("TV", 2), "mean_error": ("mean", 2), "sd_ratio": 
     "coverage": ("coverage", 2),
     "engine_s": ("CPU s", 1),
 }
-TITLE = "# Benchmark: this engine beside its peers\n"
+TITLE = "# How does the engine compare with ELFI, sbi, PyVBMC and surmise?\n"
 ABOUT = """
 Every engine has the same simulator, prior, data and number N of simulations, a process of its own
 and one processor. `signal` and `discrepancy` are this engine's two surrogates: `signal` is
@@ -174,11 +174,14 @@ def scores_table(rows, engines, cells) -> list[str]:
 def failures(rows: list[dict]) -> list[str]:
     """What has no posterior, or stopped in NUTS."""
     what = {"error": "has no posterior", "nuts_error": "stopped in NUTS"}
+    seeds: dict[tuple, list[str]] = {}
+    for name, row in product(what, rows):
+        if name in row:
+            case = row["engine"], what[name], row["task"], row["n"], row[name]
+            seeds.setdefault(case, []).append(str(row["seed"]))
     return ["\n## Failures\n"] + [
-        f"- `{r['engine']}` {text} on {r['task']} at N = {r['n']}, seed {r['seed']}: {r[name]}"
-        for name, text in what.items()
-        for r in rows
-        if name in r
+        f"- `{engine}` {text} on {task} at N = {n}, seeds {', '.join(found)}: {reason}"
+        for (engine, text, task, n, reason), found in seeds.items()
     ]
 
 
