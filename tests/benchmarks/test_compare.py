@@ -90,7 +90,7 @@ def test_what_failed_is_named_and_is_as_far_off_as_can_be():
     for name in ("total_variation", "mean_error"):
         del failed[name]
     text = report([*rows_of("signal", [0.6, 0.6]), row("elfi", 0, 0.5), failed])
-    assert "has no posterior on gauss2 at N = 20, seed 1: log densities" in text
+    assert "has no posterior on gauss2 at N = 20, seeds 1: log densities" in text
     assert lines(text, "gauss2", "20", "elfi")[0][:3] == ["2", "0.75", "0.10"]
 
 
