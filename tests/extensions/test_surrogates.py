@@ -121,6 +121,11 @@ def check_cautious(of):
     assert finite(cautious) and (cautious <= first + 1e-9).all()
 
 
+def check_stated(of):
+    """What guards against a wrong model is taken off once."""
+    assert finite(of.stated.log_likelihood(POINTS)) and of.stated.stated is of.stated
+
+
 def check_sure(of):
     assert finite(of.sure(POINTS))
 
