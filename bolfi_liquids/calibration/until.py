@@ -1,10 +1,14 @@
 """What shall be known for a search to end before its budget."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from ..errors import Argument, InputError
 from ..inputs.settings import MIN_SIMULATIONS, CalibrationSettings
+from ..inputs.table import parse_number
 
 if TYPE_CHECKING:
     from ..inference import Fit, Prior
@@ -29,6 +33,14 @@ class Goal(NamedTuple):
     learn: "Callable[[StirSimulator, Prior, Compute, bool], Callable[[Fit], float]]"
     pours: int = 0
     scene: Mapping[str, Any] = {}
+
+
+def parts_of(text: str) -> tuple[str, float]:
+    """Quantity and tolerance of QUANTITY=TOLERANCE; NaN where that is no number."""
+    quantity, _, given = (part.strip() for part in text.partition("="))
+    with suppress(ValueError):
+        return quantity, parse_number(given)
+    return quantity, np.nan
 
 
 def check_goal(goal: object, settings: CalibrationSettings, parameters: int) -> None:

@@ -1,7 +1,6 @@
 """How well the pour of a posterior so far is known, or the posterior itself."""
 
 from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,11 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..calibration.engine_fit import quick_draws
-from ..calibration.until import Goal
+from ..calibration.until import Goal, parts_of
 from ..errors import Argument, InputError
 from ..inputs.cups import cups_of
 from ..inputs.settings import PRIOR_POURS
-from ..inputs.table import parse_number
 from ..simulators import PourSimulator, StirSimulator
 from .landing_map import learn_map
 from .parcels import Parcels
@@ -42,12 +40,9 @@ def known(until: str, cups: "Cups | str | Path | None" = None) -> Goal:
 
     Raises:
         InputError: There is no such quantity, or its tolerance is not above 0, or the spilled share
-            not below 1; or the cups cannot be used.
+            not below 1; or the cups cannot be used, or are given for intervals.
     """
-    quantity, _, given = (part.strip() for part in str(until).partition("="))
-    tolerance = np.nan
-    with suppress(ValueError):
-        tolerance = parse_number(given)
+    quantity, tolerance = parts_of(str(until))
     if not 0.0 < tolerance < BELOW.get(quantity, 0.0):
         fix = "give spillage=SHARE, above 0 and below 1, or intervals=SDS, above 0"
         raise InputError(f"{until!r:.80}", where=Argument("until"), fix=fix)

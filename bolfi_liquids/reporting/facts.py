@@ -11,6 +11,7 @@ import numpy as np
 
 from ..calibration.result import Calibration
 from ..calibration.summary import CalibrationSummary, ParameterSummary, SamplerStatus, bad_fit
+from ..calibration.until import parts_of
 from ..criticism.result import Criticism
 from ..criticism.summary import CriticismSummary, DifferingWindow, PourVerdict, SourceVerdict
 from ..inference.criticism.verdict_kind import CERTAIN, MAX_STATED, VerdictKind
@@ -109,13 +110,13 @@ def _until(calibration: Calibration) -> Facts | None:
     settings, error = calibration.record["settings"], calibration.summary.until_error
     if error is None:
         return None
-    quantity, tolerance = settings["until"].split("=")
+    quantity, tolerance = parts_of(settings["until"])
     pour = quantity == "spillage"
     known = f"{100 * error:.2g}" if pour else f"{error:.2g}"
     return {
         **{"text": settings["until"], "most": settings["budget"], "pour": pour, "known": known},
         "early": calibration.summary.n_simulations < settings["budget"],
-        "reached": error <= float(tolerance),
+        "reached": error <= tolerance,
     }
 
 

@@ -577,7 +577,7 @@ def _goes_on(field: str, values: tuple[Any, Any], ends: tuple[str, ...]) -> bool
     """Whether a field that has another value lets a run go on: one of `ends`, and no smaller."""
     held, asked = values
     smaller = isinstance(held, int) and isinstance(asked, int) and asked < held
-    return field.startswith(ends) and not smaller if ends else False
+    return field.startswith(ends) and not smaller
 
 
 def _differences(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:

@@ -11,15 +11,18 @@ import argparse
 from typing import NamedTuple
 
 import numpy as np
+from bolfi_liquids.inference.interval_error import ENDS
+from bolfi_liquids.inference.sampling.importance import weighted_quantiles
 from engines import OURS
 from peers.job import Job
 from peers.run_ours import CALL, Question, question
+from scipy.special import softmax
 from tasks import TASKS, Reference, make_reference, score
+from tasks.reference import mean_and_sd
 
 from bolfi_liquids import inference
 
 USUAL = ["gauss2", "pendobs", "ball_drop", "boarding_school", "pend2", "ma2"]
-ENDS = np.array([0.05, 0.95])
 
 
 class Ended(NamedTuple):
@@ -64,20 +67,14 @@ def ended(asked: Question, reference: Reference, budget: int | inference.Until) 
         asked.simulate, asked.prior, asked.observed, budget=budget, **CALL, **asked.options
     )
     log_density = fit.log_prob(asked.prior.to_dict(reference.points))
-    mass = np.exp(log_density - log_density.max()) * reference.volume
-    off = 0.0
-    for column in reference.points.T:
-        own, exact = ends(column, mass), ends(column, reference.mass)
-        mean = np.average(column, weights=mass)
-        sd = np.sqrt(np.average((column - mean) ** 2, weights=mass))
-        off = max(off, np.abs(own - exact).max() / sd)
+    mass = softmax(log_density + np.log(reference.volume))
+    own, exact = (
+        [weighted_quantiles(column, weights, ENDS) for column in reference.points.T]
+        for weights in (mass, reference.mass)
+    )
+    _, sd = mean_and_sd(reference.points, mass)
+    off = np.max(np.abs(np.subtract(own, exact)) / sd[:, None])
     return Ended(len(fit.history.theta), score(log_density, reference).total_variation, float(off))
-
-
-def ends(values: np.ndarray, mass: np.ndarray) -> np.ndarray:
-    order = np.argsort(values)
-    reached = np.cumsum(mass[order]) - 0.5 * mass[order]
-    return np.interp(ENDS, reached / mass.sum(), values[order])
 
 
 def told(name: str, pairs: np.ndarray, until: inference.Until) -> str:
