@@ -70,7 +70,7 @@ class Cheap(NamedTuple):
     and Garnier (2014), which need not be at the other's parameters.
     """
 
-    gp: GP  # k processes, `cheap`
+    gp: GP  # k processes, `cheap`, over `coordinates`
     slope: np.ndarray  # [k]
     offset: np.ndarray  # [k]
     unit: np.ndarray  # [k], sd of the rest, by which its trend's prior is narrower
@@ -79,17 +79,17 @@ class Cheap(NamedTuple):
         """For some of the processes."""
         return Cheap(self.gp.only(chosen), *(part[chosen] for part in self[1:]))
 
-    def mean(self, u: Any) -> Any:
-        """Expected y [k, m] at u [m, d]."""
-        return self.offset[:, None] + self.slope[:, None] * predict_mean(self.gp, u)
+    def mean(self, at: Any) -> Any:
+        """Expected y [k, m] at coordinates [m, d]."""
+        return self.offset[:, None] + self.slope[:, None] * predict_mean(self.gp, at)
 
-    def covariance(self, u: Any, v: Any) -> Any:
-        """Covariance [k, m, q] between u [m, d] and v [q, d] of what is expected."""
-        return self.slope[:, None, None] ** 2 * predict_joint(self.gp, u, v)
+    def covariance(self, a: Any, b: Any) -> Any:
+        """Covariance [k, m, q] between coordinates a [m, d] and b [q, d] of what is expected."""
+        return self.slope[:, None, None] ** 2 * predict_joint(self.gp, a, b)
 
-    def variance(self, u: Any) -> Any:
-        """[k, m] at u [m, d]."""
-        return self.slope[:, None] ** 2 * predict(self.gp, u)[1]
+    def variance(self, at: Any) -> Any:
+        """[k, m] at coordinates [m, d]."""
+        return self.slope[:, None] ** 2 * predict(self.gp, at)[1]
 
 
 def coordinates(u: Any, tails: np.ndarray | None) -> Any:
@@ -165,7 +165,7 @@ def condition(hyper: Hyper, data: Data, prior: Cheap | None = None) -> GP:
     at, y = coordinates(data.u, data.tails), data.y
     gram = covariance(hyper, at, at, prior and prior.unit)
     if prior is not None:
-        gram, y = gram + prior.covariance(data.u, data.u), y - prior.mean(data.u)
+        gram, y = gram + prior.covariance(at, at), y - prior.mean(at)
     noise = data.noise(hyper.log_noise) + JITTER
     whitener = np.stack(
         [inverse_cholesky(g + np.diag(s)) for g, s in zip(gram, noise, strict=True)]
@@ -217,7 +217,7 @@ def _cross(gp: GP, u: Any) -> tuple[Any, Any]:
     alone = xp.exp(2.0 * gp.hyper.log_amplitude)[:, None] + trends
     if gp.prior is None:
         return cross, alone
-    return cross + gp.prior.covariance(u, gp.data.u), alone + gp.prior.variance(u)
+    return cross + gp.prior.covariance(at, there), alone + gp.prior.variance(at)
 
 
 def predict(gp: GP, u: Any) -> tuple[Any, Any]:
@@ -237,7 +237,7 @@ def predict_mean(gp: GP, u: Any) -> Any:
 
 def _mean(gp: GP, u: Any, cross: Any) -> Any:
     mean = (cross @ gp.weights[:, :, None])[:, :, 0]
-    return mean if gp.prior is None else gp.prior.mean(u) + mean
+    return mean if gp.prior is None else gp.prior.mean(coordinates(u, gp.data.tails)) + mean
 
 
 def _predict(gp: GP, u: Any) -> tuple[Any, Any]:
@@ -257,7 +257,7 @@ def predict_joint(gp: GP, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     at_u, at_v = _whitened(gp, _cross(gp, u)[0]), _whitened(gp, _cross(gp, v)[0])
     at, there = (coordinates(points, gp.data.tails) for points in (u, v))
     own = covariance(gp.hyper, at, there, gp.prior and gp.prior.unit) - at_u @ at_v.mT
-    return own if gp.prior is None else own + gp.prior.covariance(u, v)
+    return own if gp.prior is None else own + gp.prior.covariance(at, there)
 
 
 def draw(gp: GP, rng: np.random.Generator, u: np.ndarray, n: int) -> np.ndarray:

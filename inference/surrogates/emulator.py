@@ -8,12 +8,15 @@ import numpy as np
 from .._lazy import stats
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.namespaces import namespace
+from ..gp.optimise import minimise_in_box
 from ..gp.process import (
     GP,
+    MIN_VARIANCE,
     Cheap,
     Data,
     Hyper,
     condition,
+    coordinates,
     leave_one_out,
     leave_one_out_errors,
     leave_one_out_log_densities,
@@ -38,6 +41,7 @@ SIZE_ROUNDS = 2  # of learning sizes from errors, and the emulator with these si
 LEAST_OF_ERROR = 0.05  # of an expected squared error, added before its logarithm is taken
 NEEDED_NATS = 12.0  # log predictive density that a size by parameters must gain over a constant one
 NEEDED_OF_CHEAP = 4.0  # nats of a score's log predictive density that cheap runs must gain
+SHIFT_SD, MAX_SHIFT = 0.1, 0.3  # of a cheap simulator's coordinates, the box's width being 1
 FIXED = np.log(0.7), 0.0, np.log(0.7)  # length, amplitude and noise of the process that asks first
 
 Units = Callable[[np.ndarray], np.ndarray]
@@ -379,7 +383,7 @@ def _learned(
     hyper, prior = maximum_a_posteriori(data), None
     if limits.cheap is not None:
         u, made = limits.cheap
-        hyper, prior = _helped(hyper, data, CheapRuns(u, basis.scores(made)))
+        hyper, prior = _helped(hyper, data, CheapRuns(u, basis.scores(made)), basis.squared)
     if limits.predicted is not None:
         order, kept = _predicted(condition(hyper, data, prior), limits.predicted)
         # what is not predicted is no noise where runs agree; much of it means a chaotic simulator
@@ -426,21 +430,27 @@ def _with_noise(emulator: Emulator, gp: GP, remainder: Remainder) -> Emulator:
     return emulator._replace(gp=gp, remainder=remainder, noise=noise)
 
 
-def _helped(hyper: Hyper, data: Data, cheap: CheapRuns) -> tuple[Hyper, Cheap | None]:
+def _helped(
+    hyper: Hyper, data: Data, cheap: CheapRuns, weight: np.ndarray
+) -> tuple[Hyper, Cheap | None]:
     """Hyperparameters of the scores, and what is expected of them by cheap runs.
 
-    Cheap runs are used for those scores that they predict better where a run is left out, with the
-    slope and offset of least squares. If there are none, no bit changes.
+    Cheap runs are used for those scores that they predict better where a run is left out, at
+    shifted parameters, with the slope and offset of least squares. If there are none, no bit
+    changes.
 
     Args:
         hyper: Without cheap runs.
         data: Scores.
         cheap: Scores of cheap runs for outputs [n, k].
+        weight: Of the scores [k], their components' variances.
     """
     u, scores = cheap
-    known = Data(u, ((scores - scores.mean(0)) / _divisor(scores.std(0))).T, data.tails)
+    there, at = coordinates(u, data.tails), coordinates(data.u, data.tails)
+    known = Data(there, ((scores - scores.mean(0)) / _divisor(scores.std(0))).T)
     gp = condition(maximum_a_posteriori(known), known)
-    x, y = predict_mean(gp, data.u), data.y
+    gp = condition(gp.hyper, known._replace(u=there - _shift(gp, at, data.y, weight)))
+    x, y = predict_mean(gp, at), data.y
     varied = x - x.mean(1, keepdims=True)
     slope = np.sum(varied * y, axis=1) / _divisor(np.sum(varied**2, axis=1))
     offset = np.mean(y - slope[:, None] * x, axis=1)
@@ -456,6 +466,35 @@ def _helped(hyper: Hyper, data: Data, cheap: CheapRuns) -> tuple[Hyper, Cheap | 
         return hyper, None
     found = [np.where(helps, a.T, b.T).T for a, b in zip(own, hyper, strict=True)]
     return Hyper(*found), Cheap(gp, helps * slope, helps * offset, np.where(helps, unit, 1.0))
+
+
+def _shift(gp: GP, at: np.ndarray, y: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Shift [d] of coordinates with which cheap processes explain most of scores y [k, n].
+
+    The space mapping of Bandler et al. (1994, IEEE Trans. Microw. Theory Tech. 42, 2536) in its
+    simplest form: what coarse cells or long steps change is often what another value of a parameter
+    would, such as a larger viscosity. The most likely one, with slope and offset of least squares.
+
+    Args:
+        gp: Cheap processes, over coordinates.
+        at: Coordinates of the scores [n, d].
+        weight: Of the scores [k].
+    """
+    (n, d), y = at.shape, y - y.mean(1, keepdims=True)
+
+    def minus_log_posterior(shift: np.ndarray) -> float:
+        x = predict_mean(gp, at + shift)
+        x = x - x.mean(1, keepdims=True)
+        explained = np.sum(x * y, 1) ** 2 / _divisor(np.sum(x**2, 1))
+        left = weight @ (np.sum(y**2, 1) - explained)
+        penalty = 0.5 * np.sum((shift / SHIFT_SD) ** 2)
+        return float(0.5 * n * np.log(np.maximum(left, MIN_VARIANCE)) + penalty)
+
+    def in_box(u: np.ndarray) -> np.ndarray:
+        return MAX_SHIFT * (2.0 * u - 1.0)
+
+    found = minimise_in_box(lambda u: np.array([minus_log_posterior(s) for s in in_box(u)]), d)
+    return in_box(found)
 
 
 def _predicted(gp: GP, least: float) -> tuple[np.ndarray, np.ndarray]:

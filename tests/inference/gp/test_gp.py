@@ -7,11 +7,14 @@ import pytest
 from bolfi_liquids.inference.gp import hyperparameters
 from bolfi_liquids.inference.gp.hyperparameters import log_marginal_likelihood
 from bolfi_liquids.inference.gp.process import (
+    BOTH_TAILS,
     JITTER,
+    UPPER_TAIL,
     Cheap,
     Data,
     Hyper,
     condition,
+    coordinates,
     fantasize,
     inverse_cholesky,
     leave_one_out,
@@ -126,6 +129,19 @@ def test_cheap_runs_make_it_cokriging(rows, helped):
         traced = jax.jit(predict)(padded(fitted, 3), jnp.asarray(new[:5]))
     for one, other in zip(traced, (mean, variance), strict=True):
         np.testing.assert_allclose(one[:1], other[:, :5], rtol=1e-8)
+
+
+def test_cheap_runs_are_known_over_coordinates(rows, helped):
+    (u, y), (fitted, *_) = rows, helped
+    tails = np.array([BOTH_TAILS, UPPER_TAIL])
+    with_tails = condition(HYPER, Data(u, y, tails), fitted.prior)
+    flat = condition(HYPER, Data(coordinates(u, tails), y), fitted.prior)
+    new = np.random.default_rng(0).uniform(size=(9, 2))
+    at = coordinates(new, tails)
+    for one, other in zip(predict(with_tails, new), predict(flat, at), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9)
+    joint = predict_joint(with_tails, new, new), predict_joint(flat, at, at)
+    np.testing.assert_allclose(*joint, rtol=1e-9, atol=1e-12)
 
 
 def test_cheap_runs_stay_while_others_are_left_out_or_fantasised(rows, helped):

@@ -27,6 +27,10 @@ def euler(theta):
     return theta["start"][:, None] * (1.0 - 0.1 * theta["rate"][:, None]) ** np.arange(1, 61)
 
 
+def too_fast(theta):
+    return decay({**theta, "rate": 1.5 * theta["rate"]})
+
+
 def other_law(theta):
     return np.sin(3.0 * theta["rate"][:, None] * TIME) * theta["start"][:, None]
 
@@ -75,6 +79,11 @@ def alone():
 def test_coarse_time_steps_make_twelve_runs_enough(alone):
     assert alone > 0.4
     assert error(euler) < 0.3 * alone
+
+
+def test_the_same_law_at_another_value_is_moved_to_where_it_is_right(alone):
+    """With slope and offset alone 0.6 of the error stay."""
+    assert error(too_fast) < 0.2 * alone
 
 
 @pytest.mark.parametrize("cheap", [other_law, backwards, noise])
