@@ -79,6 +79,14 @@ ENTRIES = {f"{home}.{name}": EXPORTS[home][name] for home, name in HOMES.values(
 GUIDE = "bolfi_liquids/guide"
 CODE = re.compile(r"(?<!`)`([^`]+)`(?!`)")
 COMMAND = re.compile(r"bolfi-liquids guide (\w+)")
+SOUGHT = {  # page of the guide -> heading -> entries of the index, which the search finds first
+    f"{GUIDE}/simulator": {
+        "## Budget": "! until",
+        "## Noise": "! noise",
+        "### Your own discrepancy": "! own discrepancy, ! custom discrepancy, ! custom distance",
+    },
+    f"{GUIDE}/priors": {"## Ending early": "! until"},
+}
 TEMPLATE = "`bolfi-liquids rig template`"
 STAR = re.compile(r"(?<!\*)\*(?!\*)")  # two are napoleon's
 
@@ -96,10 +104,16 @@ def draw_gallery(app):
 
 
 def adapt(app, docname, source):
-    """A guide page's commands that show a page or a template become links; README is "Overview"."""
+    """A guide page's commands that show a page or a template become links, and its headings entries
+    of the index; README is "Overview"."""
     if docname.startswith(GUIDE):
         source[0] = re.sub(f"`{COMMAND.pattern}`", r"[\g<0>](\1.md)", source[0])
         source[0] = source[0].replace(TEMPLATE, f"[{TEMPLATE}](/docs/rig.md)")
+    for heading, entries in SOUGHT.get(docname, {}).items():
+        if f"\n{heading}\n" not in source[0]:
+            raise SphinxError(f"{docname} has no heading {heading!r}, which SOUGHT names")
+        index = f"```{{index}} {entries}\n```"
+        source[0] = source[0].replace(f"\n{heading}\n", f"\n{index}\n\n{heading}\n", 1)
     if docname == "README":
         source[0] = source[0].replace(f"# {project}\n", "# Overview\n", 1)
 
