@@ -110,10 +110,8 @@ def adapt(app, docname, source):
         source[0] = re.sub(f"`{COMMAND.pattern}`", r"[\g<0>](\1.md)", source[0])
         source[0] = source[0].replace(TEMPLATE, f"[{TEMPLATE}](/docs/rig.md)")
     for heading, entries in SOUGHT.get(docname, {}).items():
-        if f"\n{heading}\n" not in source[0]:
-            raise SphinxError(f"{docname} has no heading {heading!r}, which SOUGHT names")
-        index = f"```{{index}} {entries}\n```"
-        source[0] = source[0].replace(f"\n{heading}\n", f"\n{index}\n\n{heading}\n", 1)
+        before, after = source[0].split(f"\n{heading}\n")  # raises where there is none
+        source[0] = f"{before}\n```{{index}} {entries}\n```\n\n{heading}\n{after}"
     if docname == "README":
         source[0] = source[0].replace(f"# {project}\n", "# Overview\n", 1)
 

@@ -37,8 +37,7 @@ if TYPE_CHECKING:
 
 PREDICTIVE_DRAWS = 8
 QUICK_DRAWS = 500  # of each of two chains
-# tens of megabytes, and the log_prior that `az.psense_summary` compares with log_likelihood
-NOT_KEPT = ["log_likelihood", "log_prior", "prior_predictive"]
+NOT_KEPT = ["log_likelihood", "log_prior", "prior_predictive"]  # tens of megabytes, or no use alone
 THETA_STAR_REPLICATES = 4  # seeds at theta*, for the noise between seeds
 GRID_POINTS = 61  # of either half of an axis of the surface
 GRID_SCORES = 3.5  # normal score of the posterior's last quantile on it, to either side

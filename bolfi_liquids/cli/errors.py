@@ -108,11 +108,7 @@ def _check_none_empty(arguments: list[str]) -> None:
 
 
 def _check_none_twice(arguments: list[str], options: list[Any]) -> None:
-    """Refuse an option of one value that is repeated: click would drop all but the last.
-
-    Raises:
-        InputError: There is one.
-    """
+    """Refuse an option of one value that is repeated: click would drop all but the last."""
     typed = [argument.partition("=")[0] for argument in arguments]
     for option in options:
         if typed.count(option.opts[0]) > 1 and not (option.multiple or option.is_flag):

@@ -71,8 +71,7 @@ def simulate_kept(
             f"all {len(seeds)} simulations failed, the first at {asked[0].theta}"
             f" ({failed[0]}); {CURES[failed[0].kind]}"
         )
-    failures = *before, *(failed.get(place) for place in range(len(results)))
-    _warn_of_failures(failures, compute.timeout)
+    _warn_of_failures([*before, *map(failed.get, range(len(results)))], compute.timeout)
     seconds = sum(result.seconds for result in results)
     return Kept(np.stack(list(good.values())), np.array(list(good)), seconds)
 

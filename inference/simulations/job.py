@@ -138,7 +138,7 @@ class OneByOne:
         """
         return np.stack([float64(self.simulate(*job)) for job in jobs(theta, seeds)])
 
-    def check_here(self) -> None:
+    def _check_here(self) -> None:
         """Raise ValueError where this computer lacks what every run needs."""
 
 

@@ -59,7 +59,8 @@ class Program(OneByOne):
         keep: Folder that gets the directories of failed runs; None removes them, too.
 
     Raises:
-        ValueError: bad argument, or braces that do not match.
+        ValueError: bad argument, or braces that do not match; before the first run, where this
+            computer makes it, no such program.
     """
 
     def __init__(
@@ -86,7 +87,7 @@ class Program(OneByOne):
         run = _Run(here, tuple(sorted(named)), write, read, folder)
         super().__init__(run, _limited, describe(run))
 
-    def check_here(self) -> None:
+    def _check_here(self) -> None:
         """Raise ValueError unless the program is found, where its name is the same in all runs and
         no path in their directories."""
         first = cast(_Run, self.simulate).words[0]
