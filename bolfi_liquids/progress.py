@@ -7,16 +7,3 @@ from .inference.progress import progress_bar as progress_bar
 
 def silent(steps: int) -> None:
     """Shows nothing."""
-
-
-def after_first(kept: int, advance: Advance) -> Advance:
-    """`advance`, ignoring the first `kept` steps, which the bar already counts."""
-    passed = 0
-
-    def later(steps: int) -> None:
-        nonlocal passed
-        before, passed = passed, passed + steps
-        if (new := passed - max(kept, before)) > 0:
-            advance(new)
-
-    return later

@@ -79,6 +79,14 @@ ENTRIES = {f"{home}.{name}": EXPORTS[home][name] for home, name in HOMES.values(
 GUIDE = "bolfi_liquids/guide"
 CODE = re.compile(r"(?<!`)`([^`]+)`(?!`)")
 COMMAND = re.compile(r"bolfi-liquids guide (\w+)")
+SOUGHT = {  # page of the guide -> heading -> entries of the index, which the search finds first
+    f"{GUIDE}/simulator": {
+        "## Budget": "! until",
+        "## Noise": "! noise",
+        "### Your own discrepancy": "! own discrepancy, ! custom discrepancy, ! custom distance",
+    },
+    f"{GUIDE}/priors": {"## Ending early": "! until"},
+}
 TEMPLATE = "`bolfi-liquids rig template`"
 STAR = re.compile(r"(?<!\*)\*(?!\*)")  # two are napoleon's
 
@@ -96,10 +104,14 @@ def draw_gallery(app):
 
 
 def adapt(app, docname, source):
-    """A guide page's commands that show a page or a template become links; README is "Overview"."""
+    """A guide page's commands that show a page or a template become links, and its headings entries
+    of the index; README is "Overview"."""
     if docname.startswith(GUIDE):
         source[0] = re.sub(f"`{COMMAND.pattern}`", r"[\g<0>](\1.md)", source[0])
         source[0] = source[0].replace(TEMPLATE, f"[{TEMPLATE}](/docs/rig.md)")
+    for heading, entries in SOUGHT.get(docname, {}).items():
+        before, after = source[0].split(f"\n{heading}\n")  # raises where there is none
+        source[0] = f"{before}\n```{{index}} {entries}\n```\n\n{heading}\n{after}"
     if docname == "README":
         source[0] = source[0].replace(f"# {project}\n", "# Overview\n", 1)
 

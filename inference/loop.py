@@ -33,7 +33,7 @@ from .sobol import start_size
 from .surrogates.base import Acquisition, Family
 from .surrogates.warnings import complain
 from .types import Simulator, SingleSimulator
-from .until import Until, checked_budget, enough
+from .until import Until, check_reaches, checked_budget, enough
 
 
 def fit(  # noqa: PLR0913  the one call that most users make
@@ -191,9 +191,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     )
     if earlier is not None:
         engine.tell(*earlier)
-    due = f"reach the start design of initial={engine.initial} points"
-    cure = "raise budget or lower initial"
-    require(budget + told >= engine.initial, "budget", due, budget, cure=cure)
+    check_reaches(engine, budget, until, batch if in_rounds else 1)
     with ExitStack() as stack:
         compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         bound = "at most" if until else "at least" if confirm else ""
@@ -203,7 +201,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
             Runner(simulator, compute, shape=engine.expected_shape, identity=identity)
         )
         schedule = _in_rounds if in_rounds else _in_flight
-        finished = schedule(engine, runner, budget, batch, enough(engine, until))
+        finished = schedule(engine, runner, budget, batch, enough(engine, until, runner.bank.where))
         for _ in finished:
             advance(1)
         _check_learnable(engine, runner)

@@ -18,7 +18,7 @@ LINES_APART = 60.0  # s between lines of one phase, where there is no terminal
 def phases(*, shown: bool, bound: str = "") -> Iterator[Report]:
     """A bar for the phase that long work is in.
 
-    Without a terminal: a line for each phase, and another every minute (`pouring, 12 of 64`).
+    Without a terminal: a line (`pouring, 0 of 64`) for each phase, and another every minute.
 
     Args:
         shown: False for silence.
@@ -32,7 +32,7 @@ def phases(*, shown: bool, bound: str = "") -> Iterator[Report]:
 
     console = Console(stderr=True)
     current, done = "", 0
-    lines = _lines(console, f"to run {bound}".strip())
+    lines = _lines(console, f"of {bound}".strip())
     with _bar(console) if console.is_terminal else lines as show:
 
         def report(phase: str, finished: int, total: int) -> None:
@@ -87,19 +87,15 @@ def _bar(console: Any) -> Iterator[Report]:
 
 
 @contextmanager
-def _lines(console: Any, to_run: str) -> Iterator[Report]:
+def _lines(console: Any, of: str) -> Iterator[Report]:
     """A line where a phase begins, and where the last one is old."""
     current, last = "", 0.0
 
     def show(phase: str, done: int, total: int) -> None:
         nonlocal current, last
         now = time.monotonic()
-        if phase != current:
-            console.print(f"{phase}: {total - done} {to_run}", highlight=False)
-        elif now - last > LINES_APART:
-            console.print(f"{phase}, {done} of {total}", highlight=False)
-        else:
-            return
-        current, last = phase, now
+        if phase != current or now - last > LINES_APART:
+            console.print(f"{phase}, {done} {of} {total}", highlight=False)
+            current, last = phase, now
 
     yield show

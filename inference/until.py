@@ -24,7 +24,7 @@ class Until:
         tolerance: Of the error.
         most: Simulations, those at draws of the posterior not counted.
         error: What shall be below the tolerance, from a fit: None is `Fit.interval_error`; or the
-            expected regret of what is to be decided, in its own units.
+            expected regret of what is to be decided, in its own units, infinite while unknown.
 
     Raises:
         ValueError: a tolerance that is not positive, or bad numbers.
@@ -39,10 +39,19 @@ class Until:
         checked_integer("most", self.most, MIN_LEARN, MOST_SIMULATIONS)
         check_callable("error", self.error)
 
-    def _reached(self, made: Fit) -> bool:
+    def _reached(self, made: Fit, kept: str) -> bool:
         """Whether a fit is known well enough and has no warnings: an emulator that predicts nothing
-        has no uncertainty either."""
-        error = made.interval_error() if self.error is None else float(self.error(made))
+        has no uncertainty either. `kept` says where simulations are."""
+        if self.error is None:
+            return made.interval_error() <= self.tolerance and not made.warnings
+        try:
+            error = checked_number("it", self.error(made), lambda _: True, "a number")
+        except Exception as failed:  # whatever the user's code raises
+            raise ValueError(
+                f"error of Until cannot be used on the fit of {len(made.history.theta)} "
+                f"simulations ({type(failed).__name__}: {failed}); let it return a number, and "
+                f"repeat the call. {kept}"
+            ) from failed
         return error <= self.tolerance and not made.warnings
 
 
@@ -60,9 +69,21 @@ def checked_budget(budget: object, least: int) -> tuple[int, Until | None]:
     return checked_integer("budget", budget, least, MOST_SIMULATIONS), None
 
 
-def enough(engine: Bolfi, until: Until | None) -> Callable[[], bool]:
+def check_reaches(engine: Bolfi, budget: int, until: Until | None, batch: int) -> None:
+    """Raise ValueError for a budget that ends before the start design, or one that may end early
+    before it can."""
+    due = f"reach the start design of initial={engine.initial} points"
+    cure = "raise budget or lower initial"
+    require(budget + engine.told >= engine.initial, "budget", due, budget, cure=cure)
+    least = soonest(engine.initial, batch, engine.told)
+    due = f"exceed {least}, the simulations after which this search may end at the earliest"
+    cure = "give Until(most=...) more, or a number as budget"
+    require(until is None or budget > least, "most of Until", due, budget, cure=cure)
+
+
+def enough(engine: Bolfi, until: Until | None, kept: str) -> Callable[[], bool]:
     """A function that says whether to stop: after the start design it looks at every fifth
-    simulation."""
+    simulation. `kept` says where simulations are."""
     looked, in_a_row = engine.initial, 0
 
     def stop() -> bool:
@@ -71,19 +92,22 @@ def enough(engine: Bolfi, until: Until | None) -> Callable[[], bool]:
         if until is None or early:
             return False
         looked = engine.told
-        in_a_row = in_a_row + 1 if until._reached(engine.fit(warn=False)) else 0
+        in_a_row = in_a_row + 1 if until._reached(engine.fit(warn=False), kept) else 0
         return in_a_row == IN_A_ROW
 
     return stop
 
 
-def soonest(start: int, batch: int) -> int:
+def soonest(start: int, batch: int, told: int = 0) -> int:
     """Simulations after which a search that runs in rounds may end at the earliest.
 
     Args:
         start: In the start design.
         batch: Made between two questions whether to stop.
+        told: Earlier ones, which are not counted.
     """
+    made = 0
     for _ in range(IN_A_ROW):
-        start = -(-(start + EVERY) // batch) * batch
-    return start
+        made = max(made, -(-(start + EVERY - told) // batch) * batch)
+        start = told + made
+    return made

@@ -9,7 +9,7 @@ SOUND, RUNAWAY, UNSOLVED, DRIFTED = range(4)
 ABSENT = -1  # of a place among simulations that march together
 REASONS = {
     UNSOLVED: "its viscosity is too large to compute with; take a smaller one",
-    DRIFTED: "its level moved by more than 2 %: take smaller cells or shorter steps",
+    DRIFTED: "its level moved by more than 2 %: give more particles, or check cup, fill and stick",
     RUNAWAY: "a particle ran away: its velocity is not finite or beyond any liquid's",
 }
 

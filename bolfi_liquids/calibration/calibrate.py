@@ -23,12 +23,11 @@ from ..inputs.settings import (
     Surrogate,
 )
 from ..inputs.start import check_start
-from ..progress import after_first, progress_bar
+from ..progress import progress_bar
 from ..run.compute import open_compute
 from ..run.given_pours import keep_pours
 from ..run.results import generations, versions
 from ..run.run import RUN_TOML, Run
-from ..run.simulations import warn_of_failures
 from ..simulators import StirSimulator, stir_simulator
 from ..wording import spoken, with_unit
 from .baseline import (
@@ -56,7 +55,7 @@ from .model_error import (
 from .result import Calibration
 from .stirs import camera_noise, sensor_noise, with_model_error
 from .summary import CalibrationSummary
-from .until import Goal, check_goal
+from .until import Goal, check_goal, usual_budget
 
 if TYPE_CHECKING:
     from ..inference import Prior
@@ -77,7 +76,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     baseline: CleanSource | Sequence[CleanSource] = (),
     pours: Pours | None = None,
     cups: "Cups | str | Path | None" = None,
-    budget: int = 20,
+    budget: int | None = None,
     until: Goal | None = None,
     seed: int = 0,
     surrogate: Surrogate = "signal",
@@ -110,8 +109,9 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         pours: A table of pours of the liquid that were made, or its path: the posterior does not
             depend on it, but `choose_pour` does.
         cups: With which they were made, or a TOML file of them; None takes the bundled ones.
-        budget: Simulations of the search. Eight more check it at draws of the posterior, eight
-            further ones follow if they move it, and four measure the noise between seeds.
+        budget: Simulations of the search; None is 20, or with `until` 60 at most. Eight more check
+            it at draws of the posterior, eight further ones follow if they move it, and four
+            measure the noise between seeds.
         until: What ends the search earlier, see `known`. After the start design it is looked at
             about every fifth simulation, at the end of a batch, and must be reached twice in a row
             by fits without warnings. Pours that this needs are simulated first, and kept in `out`.
@@ -137,6 +137,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         ValueError, ImportError, ConnectionError: `executor` cannot be used.
         RuntimeError: Simulations failed; the message says how.
     """
+    if budget is None:
+        budget = usual_budget(until)
     settings = CalibrationSettings(
         budget=budget,
         until=getattr(until, "text", None),
@@ -216,15 +218,14 @@ def _calibrate(
     needed += PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
     with run.bank() as bank, ExitStack() as stack:
         compute = replace(compute, batch=settings.batch, bank=bank)
-        budget, known, poured = settings.budget, None, 0
+        budget, known = settings.budget, None
         if until is not None:  # nothing is stirred before its pours are there
             known = until.learn(stirring, run.prior, compute, progress)
-            budget, poured = Until(until.tolerance, budget, known), until.pours
-        kept = min(len(bank) - poured, needed)
+            budget = Until(until.tolerance, budget, known)
         # more are made where the first that confirm the posterior move it
         bound = "at most" if until else "at least"
-        bar = progress_bar("simulating stirs", needed, shown=progress, done=kept, bound=bound)
-        advance = after_first(kept, stack.enter_context(bar))
+        bar = progress_bar("simulating stirs", needed, shown=progress, bound=bound)
+        advance = stack.enter_context(bar)
         error, noise = None, None
         # the paper's surrogate has no noise to which an error adds
         if settings.surrogate == "signal":
@@ -263,7 +264,6 @@ def _calibrate(
             error = model_error(stirring, fit.best["viscosity"], learned)
             noise = with_model_error(cameras, error)
         fit = confirmed(fit, noise, stirring, compute, settings, advance)
-        warn_of_failures(fit.history.why.tolist(), compute.timeout)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 PREDICTIVE_DRAWS = 8
 QUICK_DRAWS = 500  # of each of two chains
-NOT_KEPT = ["log_likelihood", "log_prior", "prior_predictive"]  # tens of megabytes
+NOT_KEPT = ["log_likelihood", "log_prior", "prior_predictive"]  # tens of megabytes, or no use alone
 THETA_STAR_REPLICATES = 4  # seeds at theta*, for the noise between seeds
 GRID_POINTS = 61  # of either half of an axis of the surface
 GRID_SCORES = 3.5  # normal score of the posterior's last quantile on it, to either side
@@ -207,7 +207,9 @@ def results_tree(
     closest, good = closest_drawn(fit, stirring)
     at_best = {name: np.full(THETA_STAR_REPLICATES, value) for name, value in fit.best.items()}
     seeds = simulation_seeds(seed, Phase.REPLICATES, THETA_STAR_REPLICATES)
-    replicates = simulate_kept(stirring, at_best, seeds, compute, advance=advance)
+    replicates = simulate_kept(
+        stirring, at_best, seeds, compute, advance=advance, before=fit.history.why.tolist()
+    )
     frames = {
         "time": ("frame", stirring.time, {"units": "s"}),
         "recording": ("frame", stirring.member),

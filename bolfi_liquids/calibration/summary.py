@@ -16,6 +16,7 @@ from ..models import stirring_error
 from ..run.results import Number, Section
 from ..simulators import StirSimulator
 from ..wording import degrees, with_unit
+from .engine_fit import THETA_STAR_REPLICATES
 from .stirs import irreducible_rms, rms
 
 if TYPE_CHECKING:
@@ -184,7 +185,7 @@ class CalibrationSummary(Section):
             best=fit.best,
             closest={name: float(closest[name]) for name in fit.prior.names},
             n_simulations=searched,
-            n_check_simulations=len(fit.history.theta) - searched + len(replicates),
+            n_check_simulations=len(fit.history.theta) - searched + THETA_STAR_REPLICATES,
             fit_rms_deg=float(np.degrees(rms(misfit))),
             noise_deg=float(np.degrees(irreducible_rms(seen, replicates))),
             emulator_warnings=tuple(fit.warnings),

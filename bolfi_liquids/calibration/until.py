@@ -24,14 +24,12 @@ class Goal(NamedTuple):
         tolerance: Error at which the search ends.
         learn: Makes the error of a fit, after the pours that it rests on; the last argument is
             whether to show bars.
-        pours: Number of these pours.
         scene: Everything that fixes them, for run.toml.
     """
 
     text: str
     tolerance: float
     learn: "Callable[[StirSimulator, Prior, Compute, bool], Callable[[Fit], float]]"
-    pours: int = 0
     scene: Mapping[str, Any] = {}
 
 
@@ -41,6 +39,15 @@ def parts_of(text: str) -> tuple[str, float]:
     with suppress(ValueError):
         return quantity, parse_number(given)
     return quantity, np.nan
+
+
+def usual_budget(goal: object) -> int:
+    """Simulations of a search where nobody says how many; with a goal, the most of an `Until`."""
+    if goal is None:
+        return CalibrationSettings.budget
+    from ..inference import Until
+
+    return Until.most
 
 
 def check_goal(goal: object, settings: CalibrationSettings, parameters: int) -> None:

@@ -84,7 +84,7 @@ def _global_options(
     epilog=examples(
         "calibrate stir.nc --budget 20 --out runs/mine",
         "calibrate stir.nc --budget 40 --out runs/mine --resume",
-        "calibrate stir.nc --budget 60 --until spillage=0.02 --out runs/mine",
+        "calibrate stir.nc --until spillage=0.02 --out runs/mine",
     )
 )
 @grouped
@@ -116,7 +116,7 @@ def calibrate(  # noqa: PLR0913  an option each
 
     check_needed(ctx, "--pours", "--liquid")
     goal = None if settings.until is None else known(settings.until, cups)
-    if goal is None or not goal.pours:
+    if goal is None or not goal.scene:
         check_needed(ctx, "--pours", "--cups")
     if resume:
         check_resumable(out)
@@ -124,6 +124,8 @@ def calibrate(  # noqa: PLR0913  an option each
     made_with = None if table is None else cups
     data = {"pours": table, "cups": made_with, "baseline": baseline or ()}
     chosen: dict[str, Any] = {**asdict(settings), "until": goal}
+    if "--budget" not in typed_options(ctx):
+        del chosen["budget"]
     with printed.complaints_among_results(), compute.arguments() as where:
         calibration = run_calibrate(opened, out=out, resume=resume, **data, **where, **chosen)
     results = Results.of(calibration.run)

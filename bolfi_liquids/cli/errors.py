@@ -56,6 +56,7 @@ class OneLineErrors(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         try:
             _check_none_empty(ctx.meta[GIVEN])
+            _check_none_twice(ctx.meta[GIVEN], self._typed(ctx))
             return super().invoke(ctx)
         except KeyboardInterrupt:
             say(how_to_go_on(sys.argv[1:]))
@@ -70,20 +71,17 @@ class OneLineErrors(TyperGroup):
             if ctx.params.get("debug"):
                 traceback.print_exc()
             own = isinstance(err, InputError)
-            say(f"error: {err.as_typed(self._options(ctx)) if own else explained(err)}")
+            names = {option.name: option.opts[0] for option in self._typed(ctx)}
+            say(f"error: {err.as_typed(names) if own else explained(err)}")
             failed = FAILED if isinstance(err, RuntimeError) else USAGE_ERROR
             raise typer.Exit(getattr(err, "status", failed)) from None
 
-    def _options(self, ctx: Any) -> dict[str, str]:
-        """Options of the command that was typed, by the names of Python's arguments."""
+    def _typed(self, ctx: Any) -> list[Any]:
+        """Options of the command that was typed."""
         typed: Any = self
         for word in ctx.meta[GIVEN]:
             typed = getattr(typed, "commands", {}).get(word, typed)
-        return {
-            parameter.name: parameter.opts[0]
-            for parameter in typed.params
-            if parameter.opts[0].startswith("--")
-        }
+        return [one for one in typed.params if one.opts[0].startswith("--")]
 
 
 def _misused(err: TyperException) -> typer.Exit:
@@ -107,6 +105,14 @@ def _check_none_empty(arguments: list[str]) -> None:
         if not value.strip():
             named = option if option.startswith("-") else "an argument"
             raise InputError("is empty", where=named, fix="give a value; was a variable not set?")
+
+
+def _check_none_twice(arguments: list[str], options: list[Any]) -> None:
+    """Refuse an option of one value that is repeated: click would drop all but the last."""
+    typed = [argument.partition("=")[0] for argument in arguments]
+    for option in options:
+        if typed.count(option.opts[0]) > 1 and not (option.multiple or option.is_flag):
+            raise InputError("is given twice", where=option.opts[0], fix="give it once")
 
 
 def _values(arguments: list[str]) -> Iterator[tuple[str, str]]:

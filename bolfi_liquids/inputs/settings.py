@@ -137,7 +137,7 @@ def helped(text: str, *, metavar: str = "", **limits: Any) -> Any:
 class CalibrationSettings:
     """Settings of a calibration, which is decided by them, its recordings and its prior."""
 
-    budget: Annotated[Simulations, helped("Simulations of the search.")] = 20
+    budget: Annotated[Simulations, helped("Simulations of the search; 60 with --until.")] = 20
     until: Annotated[
         str | None,
         helped(

@@ -54,7 +54,7 @@ def known(until: str, cups: "Cups | str | Path | None" = None) -> Goal:
         return Goal(text, tolerance, lambda *_: lambda fit: fit.interval_error())
     cups = cups_of(cups)
     scene = {"pour": {**cups.settings(), "pours": PRIOR_POURS}}
-    return Goal(text, tolerance, partial(regret_of, cups, PRIOR_POURS), PRIOR_POURS, scene)
+    return Goal(text, tolerance, partial(regret_of, cups, PRIOR_POURS), scene)
 
 
 def regret_of(

@@ -38,6 +38,7 @@ def simulate_kept(
     compute: Compute,
     *,
     advance: Advance = silent,
+    before: Sequence[Failure | None] = (),
 ) -> Kept:
     """Signals for each theta and seed; those found in the bank are not simulated again.
 
@@ -47,6 +48,7 @@ def simulate_kept(
         seeds: n seeds.
         compute: Where simulations are made and kept.
         advance: Called with 1 for each simulation, also for those found in the bank.
+        before: Failures of simulations made before; the log counts them with these.
 
     Returns:
         The simulations in order; failed ones are left out of the signals.
@@ -69,12 +71,12 @@ def simulate_kept(
             f"all {len(seeds)} simulations failed, the first at {asked[0].theta}"
             f" ({failed[0]}); {CURES[failed[0].kind]}"
         )
-    warn_of_failures([failed.get(place) for place in range(len(results))], compute.timeout)
+    _warn_of_failures([*before, *map(failed.get, range(len(results)))], compute.timeout)
     seconds = sum(result.seconds for result in results)
     return Kept(np.stack(list(good.values())), np.array(list(good)), seconds)
 
 
-def warn_of_failures(failures: Sequence[Failure | None], timeout: float | None) -> None:
+def _warn_of_failures(failures: Sequence[Failure | None], timeout: float | None) -> None:
     """Log how many simulations were given up or failed otherwise, which bars count as done.
 
     Args:

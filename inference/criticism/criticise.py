@@ -87,7 +87,7 @@ class Criticism(Displayed):
             ("next", self.advice),
             ("accepted", ", ".join(self.accepted) or "none"),
             *sizes,
-            ("explanations tested", str(len(self.candidates))),
+            ("explanations tested", str(len(self.candidates)) if self.units else "no extensions"),
             *([("could hide", hidden)] if hidden else []),
             *untested,
             *([("changed no signal", f"{inert}; does the simulator read it?")] if inert else []),
@@ -98,6 +98,8 @@ class Criticism(Displayed):
     @property
     def advice(self) -> str:
         """What to do next."""
+        if not self.units and self.verdict.kind is VerdictKind.AGREEMENT:
+            return "Give extensions, to learn how large an effect these data could hide."
         leading = self.leading
         confirmed = leading is not None and bool(leading.gaps) and leading.accepted
         return advice(self.verdict.kind, confirmed=confirmed, suggested=bool(self.suggestions))

@@ -27,8 +27,8 @@ def criticise_fit(
 
     Args:
         fit: What `fit` returned, with any surrogate.
-        extensions: What the simulator may lack, by name. The simulator gets those coefficients
-            that act beside the parameters.
+        extensions: What the simulator may lack, by name; without any, it is only tested. The
+            simulator gets those coefficients that act beside the parameters.
         noise: Between the simulator and the data; None is what the fit was given or, for a series
             of one channel, estimated. An estimate holds what the simulator misses, and hides some
             of it.

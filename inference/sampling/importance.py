@@ -200,6 +200,9 @@ class Evidence(NamedTuple):
     log: float
     error: float
 
+    def __repr__(self) -> str:
+        return f"Evidence(log={self.log:.2f}, error={self.error:.2g})"
+
 
 def evidence_of(
     found: Population, target: Target, log_second_moment: Callable[[np.ndarray], np.ndarray]

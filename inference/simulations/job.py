@@ -138,6 +138,9 @@ class OneByOne:
         """
         return np.stack([float64(self.simulate(*job)) for job in jobs(theta, seeds)])
 
+    def _check_here(self) -> None:
+        """Raise ValueError where this computer lacks what every run needs."""
+
 
 def for_engine(
     simulate: Simulator | SingleSimulator,

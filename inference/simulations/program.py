@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from string import Formatter
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -59,7 +59,8 @@ class Program(OneByOne):
         keep: Folder that gets the directories of failed runs; None removes them, too.
 
     Raises:
-        ValueError: bad argument, or braces that do not match.
+        ValueError: bad argument, or braces that do not match; before the first run, where this
+            computer makes it, no such program.
     """
 
     def __init__(
@@ -85,6 +86,15 @@ class Program(OneByOne):
         here = tuple(map(_from_here, words))
         run = _Run(here, tuple(sorted(named)), write, read, folder)
         super().__init__(run, _limited, describe(run))
+
+    def _check_here(self) -> None:
+        """Raise ValueError unless the program is found, where its name is the same in all runs and
+        no path in their directories."""
+        first = cast(_Run, self.simulate).words[0]
+        name = "" if _parsed("command", first, lambda word: [word])[1] else first.format()
+        elsewhere = not name or ("/" in name and not os.path.isabs(name))
+        due = "begin with a program that this computer has and may execute"
+        require(elsewhere or shutil.which(name), "command", due, name, cure="correct its path")
 
 
 def check_names(simulator: object, parameters: Collection[str]) -> None:

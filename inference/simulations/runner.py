@@ -170,6 +170,9 @@ class Runner:
 
     def _simulate(self, orders: Sequence[Order]) -> None:
         """Make the runs in one call, here or on the executor."""
+        here = self.executor is None or is_pool(self.executor)
+        if here and isinstance(self.simulate, OneByOne):
+            self.simulate._check_here()
         batch = [order.job for order in orders]
         work = partial(run_batch, self.simulate, batch, self.shape, self.timeout)
         if self.executor is None:

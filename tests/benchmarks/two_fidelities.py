@@ -68,7 +68,7 @@ def error(fine: Runs, coarse: Runs, mixture: tuple[int, int], held_out: Runs) ->
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser()
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--pools", type=int, default=3)
     pools = range(parser.parse_args().pools)
     warnings.simplefilter("ignore")  # of cells that no reference was compared with

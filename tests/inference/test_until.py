@@ -97,11 +97,11 @@ def test_a_family_of_one_s_own_is_not_known_to_be_known():
     fit = inference.fit(
         *(decay, PRIOR, OBSERVED),
         surrogate=Silent(noise=NOISE),
-        budget=inference.Until(most=20),
+        budget=inference.Until(most=26),
         **{"confirm": 0, "warn": False, "progress": False},
     )
     assert np.isnan(fit.interval_error())
-    assert len(fit.history.theta) == 20
+    assert len(fit.history.theta) == 26
     assert "interval ends" not in repr(fit)
 
 
@@ -141,6 +141,45 @@ def test_one_look_below_the_tolerance_may_be_luck():
     errors = itertools.cycle([0.0, 1.0])
     fit = fitted(decay, budget=inference.Until(most=30, error=lambda fit: next(errors)))
     assert len(fit.history.theta) == 30
+
+
+def broken(fit):
+    raise KeyError("cup")
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [(lambda fit: None, "None"), (lambda fit: np.nan, "nan"), (broken, "KeyError: 'cup'")],
+)
+def test_an_error_that_is_no_number_is_named_and_nothing_is_simulated_twice(error, told, tmp_path):
+    calls = []
+
+    def simulate(theta, seeds):
+        calls.extend(seeds)
+        return decay(theta, seeds)
+
+    bank = tmp_path / "bank.sqlite"
+    with pytest.raises(ValueError, match=rf"^error of Until .* 16 .*{told}.*{bank}"):
+        fitted(simulate, budget=inference.Until(error=error), bank=bank)
+    assert len(calls) == 16
+    fitted(simulate, budget=inference.Until(most=26, error=lambda fit: np.inf), bank=bank)
+    assert len(calls) == len(set(calls)) == 26
+
+
+@pytest.mark.parametrize(("batch", "earlier"), [(1, 0), (4, 0), (3, 7), (32, 7), (4, 40)])
+def test_the_most_is_refused_where_nothing_could_end_earlier(batch, earlier):
+    u = np.random.default_rng(0).random((earlier, 2))
+    theta = PRIOR.from_unit(u)
+    how = {"batch": batch, "earlier": (theta, decay(theta, None)) if earlier else None}
+
+    def soonest(most):
+        known = inference.Until(most=most, error=lambda fit: 0.0)
+        return len(fitted(decay, budget=known, **how).history.theta) - earlier
+
+    made = soonest(120)
+    assert soonest(made + 1) == made
+    with pytest.raises(ValueError, match=rf"^most of Until must exceed {made},"):
+        soonest(made)
 
 
 @pytest.mark.parametrize("budget", ["all", 0, None])

@@ -1,10 +1,13 @@
 """A calibration that ends before its budget, once it knows enough."""
 
+import tomllib
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 import bolfi_liquids as bl
+from bolfi_liquids.calibration import calibrate as calibrating
 from bolfi_liquids.calibration.until import Goal
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.errors import InputError
@@ -73,6 +76,23 @@ def test_what_cannot_end_a_search_is_refused_before_anything_is_made(
     result = CliRunner().invoke(app, ["calibrate", str(short_recording), "--out", str(run), *typed])
     assert result.exit_code == 2 and not run.exists()
     assert all(part in result.stderr for part in told)
+
+
+@pytest.mark.parametrize(
+    ("typed", "budget"),
+    [
+        ([], 20),
+        (["--until", "intervals=0.2"], 60),
+        (["--until", "intervals=0.2", "--budget", 30], 30),
+    ],
+)
+def test_a_budget_that_is_not_typed_lets_the_search_end(
+    short_recording, tmp_path, monkeypatch, typed, budget
+):
+    monkeypatch.setattr(calibrating, "_calibrate", lambda *_: None)
+    command = ["calibrate", short_recording, "--out", tmp_path / "run", *typed]
+    assert "not finished" in CliRunner().invoke(app, list(map(str, command))).stderr
+    assert tomllib.loads((tmp_path / "run/run.toml").read_text())["settings"]["budget"] == budget
 
 
 def test_a_text_is_no_goal_in_python(short_recording, tmp_path):

@@ -39,6 +39,8 @@ REFUSED = {
     "calibrate stir.nc --out run --cups cups.toml": "--cups: needs --pours",
     "calibrate stir.nc --out run --workers 2 --dask tcp://127.0.0.1:9": "--dask: names another",
     "calibrate stir.nc --out run --liquid oil": "--liquid: needs --pours, which is missing; give",
+    "calibrate stir.nc --out run --until a=1 --until=b=2": "--until: is given twice;",
+    "calibrate stir.nc --out run --pours a.csv --pours b.csv": "--pours: is given twice;",
     "import table.csv": "--columns: is missing;",
     "calibrate stir.nc --out=": "--out: is empty",
     "criticise run --held-out-pours pours.csv": "--held-out-pours: needs --pours",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
 from bolfi_liquids.inference.simulations import BatchSimulator, Compute
-from bolfi_liquids.inference.simulations.failures import FailureKind
+from bolfi_liquids.inference.simulations.failures import FailureKind, not_finite
 
 from bolfi_liquids.run.simulations import (
     CURES,
@@ -103,7 +103,8 @@ def test_simulations_that_failed_are_counted_with_the_first_reason(caplog):
         for repeated in range(2):  # what the bank holds is told again
             caplog.clear()
             compute = Compute(bank=bank, batch=1, timeout=0.2)
-            simulate_kept(Made(simulate), theta, [1, 2, 3, 4, 5], compute)
+            before = [None, not_finite("it diverged")]
+            simulate_kept(Made(simulate), theta, [1, 2, 3, 4, 5], compute, before=before)
             overdue, failed = caplog.records
-            assert overdue.args == (1, 5, 0.2), repeated
-            assert failed.args[:2] == (2, 5) and "\n" not in failed.getMessage()
+            assert overdue.args == (1, 7, 0.2), repeated
+            assert failed.args[:2] == (3, 7) and "\n" not in failed.getMessage()

@@ -63,6 +63,7 @@ def test_without_effects_to_look_for_a_model_is_only_tested(drift, verdict):
     found = criticism.criticise(experiment(drift=drift), PRIOR, {}, held_out=held_back, plan=PLAN)
     assert found.verdict.kind == verdict
     assert not found.candidates and found.confusion.shape == (0, 0)
+    assert "extension" in found.advice and "no extensions" in repr(found)
 
 
 class Counted:

@@ -1,10 +1,16 @@
 """The weighted population against posteriors whose moments and evidence are known."""
 
+import re
 from functools import partial
 
 import numpy as np
 import pytest
-from bolfi_liquids.inference.sampling.importance import explore, fit_mixture, log_mixture
+from bolfi_liquids.inference.sampling.importance import (
+    Evidence,
+    explore,
+    fit_mixture,
+    log_mixture,
+)
 from bolfi_liquids.inference.sampling.target import Target
 from scipy.special import logsumexp, ndtr
 
@@ -98,3 +104,10 @@ def test_the_mixture_integrates_to_one():
     prior = -0.5 * (points**2).sum(1) - np.log(2.0 * np.pi)
     ratio = np.exp(log_mixture(mixture, points) - prior)
     assert abs(ratio.mean() - 1.0) < 4.0 * ratio.std() / np.sqrt(len(points))
+
+
+def test_an_evidence_is_printed_to_what_its_error_leaves():
+    log, error = -1234.567890123, 0.010648
+    shown = re.findall(r"[-\d.]+", repr(Evidence(log, error)))
+    assert len("".join(shown)) < 14
+    np.testing.assert_allclose([float(one) for one in shown], [log, error], atol=0.5 * error)

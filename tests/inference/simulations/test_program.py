@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import nullcontext
 from multiprocessing import get_context
 
 import numpy as np
@@ -143,7 +144,6 @@ def test_an_output_of_another_shape_is_no_signal(here):
         ("sh -c 'echo {a} >&2; kill -SEGV $$'", r"signal SIGSEGV; stderr ends:\n0.5"),
         ("sh -c 'echo {a} >&2' {out}", r"`out` must hold numbers, got 'nothing'.*0.5"),
         ("sh -c 'echo diverged at {a}'", r"could not convert string 'diverged'"),
-        ("no-such-program {a}", r"No such file or directory: 'no-such-program'"),
         ("echo 1", r"parameters must all be in braces .* got \['a'\]"),
         ("echo {a} {b}", r"names in braces must be among .* got \['b'\]"),
     ],
@@ -252,6 +252,36 @@ def test_a_misspelt_parameter_costs_no_simulation(here):
             with pytest.raises(ValueError, match=told):
                 make(program)
     assert not (here / "ran").exists()
+
+
+@pytest.mark.parametrize("pool", [None, ThreadPoolExecutor])
+@pytest.mark.parametrize("command", ["no-such-program {a}", "./nowhere {a}", "./decay.py {a}"])
+def test_a_program_that_is_not_there_is_refused_and_not_tried(here, pool, command):
+    program = Program(command, keep="failed")
+    prior = inference.Prior({"a": dist.Uniform(0.0, 1.0)})
+    with pool(2) if pool else nullcontext() as executor:
+        with pytest.raises(ValueError, match="^command must begin with a program"):
+            inference.fit(program, prior, [0.5], executor=executor, progress=False)
+    assert not (here / "failed").exists()
+
+
+def test_what_a_bank_holds_needs_no_program(here):
+    program, jobs = Program("./echo {a} {seed}"), [Job({"a": 0.5}, 3)]
+    with inference.SimulationBank() as bank:
+        (first,) = made(program, jobs, bank=bank)
+        (here / "echo").unlink()
+        (again,) = made(program, jobs, bank=bank)
+    np.testing.assert_array_equal(again.signal, first.signal)
+
+
+def test_a_program_may_be_written_for_each_run(here):
+    def write(directory, theta, seed):
+        (directory / "bin").mkdir()
+        (directory / "bin" / "model").write_text(SHELL)
+        (directory / "bin" / "model").chmod(0o755)
+
+    run = one(Program("bin/model {a} 1", write=write), {"a": 0.5})
+    assert run.signal is not None and run.signal.tolist() == [0.5, 1.0]
 
 
 def test_a_person_s_interrupt_ends_the_program(here, monkeypatch):
