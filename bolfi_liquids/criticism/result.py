@@ -168,11 +168,7 @@ class Criticism:
         return shown(partial(figures.pour_residual_plot, self._of("pours")), axes)
 
     def _of(self, source: str, group: str = "effects") -> "DataTree":
-        """The groups of "stirs" or "pours".
-
-        Raises:
-            ValueError: It was not criticised, or has no such group.
-        """
+        """The groups of "stirs" or "pours"."""
         if f"/{source}/{group}" not in self.tree.groups:
             option = group if group == "held_out" else source
             raise ValueError(f"nothing was found on {option}; criticise the run with {option}")
