@@ -107,8 +107,7 @@ class Recording:
 
     def values(self, name: str) -> NDArray[np.float64]:
         """A variable of its file, with SI units, shape (T,)."""
-        columns = (self.time, *self.gripper.position.T, *self.inclination.T)
-        return dict(zip(UNITS, columns, strict=True))[name]
+        return along_path(self, self.inclination)[name]
 
     def number(self, name: str) -> float:
         """A numeric attribute, in SI units."""
