@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..wording import html_table
+from ..inference.notebook_display import html_table
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -91,7 +91,7 @@ class Recording:
         return f"Recording({str(self.path)!r}: {told})"
 
     def _repr_html_(self) -> str:
-        return html_table("Recording", {"file": self.path, **self.subjects()})
+        return html_table("Recording", [("file", self.path), *self.subjects().items()])
 
     def subjects(self) -> dict[str, str]:
         """Texts about the recording by subject, as far as the file has them."""
