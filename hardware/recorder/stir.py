@@ -246,7 +246,6 @@ def _way_near(samples: Columns, span: Span) -> Trajectory:
 
 
 def _delay(raw: Raw, view: View, span: Span, series: FrameSeries) -> Delay:
-    """Delay of a camera."""
     fault = raw.faults[view]
     try:
         return fit_delay(
