@@ -1,16 +1,13 @@
 """Files that are there to be read, and files that are written whole or not at all."""
 
-import errno
 import os
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from .errors import InputError
-
-if TYPE_CHECKING:
-    from xarray import Dataset, DataTree
+from .hardware.whole_files import disk_errno as disk_errno
+from .hardware.whole_files import write_netcdf as write_netcdf
+from .hardware.whole_files import write_whole as write_whole
 
 
 def as_path(given: object, where: str) -> Path:
@@ -85,49 +82,6 @@ def new_file(path: str | Path, where: str, *, suffix: str = "", replace: bool = 
         fix = "choose a place that can be written"
         raise InputError(f"{err.strerror}", where=str(path.parent), fix=fix) from err
     return path
-
-
-def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
-    """Let `write` fill a temporary file beside `path`, then move it into place.
-
-    A reader, or a crash in between, sees the old file or the new one and never a part.
-
-    Returns:
-        `path`.
-    """
-    temporary = None
-    try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        os.close(handle)
-        temporary = Path(name)
-        write(temporary)
-        temporary.chmod(0o644)  # mkstemp's own mode hides results from a group
-        temporary.replace(path)
-    except OSError as err:
-        if (why := disk_errno(err)) is None:
-            raise
-        raise OSError(why, os.strerror(why), str(path)) from err
-    finally:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
-    return path
-
-
-_OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
-
-
-def disk_errno(err: BaseException) -> int | None:
-    """The number of the disk's refusal to write that an error tells of; None if of none."""
-    number = getattr(err, "errno", None)
-    return number if number in _OF_THE_DISK else None
-
-
-def write_netcdf(data: "Dataset | DataTree", path: Path) -> Path:
-    """Write data by `write_whole`, such that xarray reads them back with h5netcdf."""
-    from .hardware.netcdf import netcdf_content
-
-    content = netcdf_content(data)
-    return write_whole(path, lambda temporary: temporary.write_bytes(content))
 
 
 def write_text(path: Path, text: str) -> Path:

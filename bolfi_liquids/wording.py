@@ -1,9 +1,7 @@
 """Words that the terminal, the report and the figures share: names, units and numbers."""
 
 import shlex
-from collections.abc import Iterable, Mapping
-from html import escape
-from typing import Any
+from collections.abc import Iterable
 
 LIQUID_UNITS = {"viscosity": "Pa s"}
 """Units of the liquid's parameters; the others are dimensionless."""
@@ -65,13 +63,3 @@ def at_most(fraction: float) -> str:
 def command(*words: object) -> str:
     """A command of this program, to be copied into a shell whatever blanks its paths have."""
     return shlex.join(["bolfi-liquids", *map(str, words)])
-
-
-def html_table(title: str, rows: Mapping[str, Any]) -> str:
-    """A table of two columns for a notebook; its texts are escaped."""
-    cells = "".join(
-        f"<tr><th style='text-align:left'>{escape(str(name))}</th>"
-        f"<td style='text-align:left'>{escape(str(value))}</td></tr>"
-        for name, value in rows.items()
-    )
-    return f"<table><caption>{escape(title)}</caption>{cells}</table>"

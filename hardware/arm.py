@@ -73,27 +73,22 @@ class ArmReader(Protocol):
         Raises:
             RigError: There is no controller, or it refuses.
         """
-        ...
 
     @abstractmethod
     def read(self) -> ArmState:
         """The latest state; never waits."""
-        ...
 
     @abstractmethod
     def time(self) -> float:
         """Controller's clock of the latest state [s]; a look for whether there is a new one."""
-        ...
 
     @abstractmethod
     def payload(self) -> Payload:
         """Payload on the flange by the controller."""
-        ...
 
     @abstractmethod
     def close(self) -> None:
         """Let the connection go; harmless when repeated."""
-        ...
 
 
 class PathFollower(ArmReader, Protocol):
@@ -107,22 +102,18 @@ class PathFollower(ArmReader, Protocol):
             RigError: The controller refuses.
             LinkLost: It did not take the tool's centre or the payload.
         """
-        ...
 
     @abstractmethod
     def tcp(self) -> Six:
         """Tool's centre in the flange's frame [m, rad]; waits for the controller's answer."""
-        ...
 
     @abstractmethod
     def allows(self, pose: np.ndarray) -> bool:
         """Whether the controller's own safety limits allow a pose; waits for its answer."""
-        ...
 
     @abstractmethod
     def arm_watchdog(self) -> None:
         """Make the controller stop the arm when set-points cease."""
-        ...
 
     @abstractmethod
     def command(self, pose: np.ndarray) -> None:
@@ -132,17 +123,14 @@ class PathFollower(ArmReader, Protocol):
             MotionRejected: It breaks a limit; nothing was sent.
             LinkLost: The controller did not take it.
         """
-        ...
 
     @abstractmethod
     def stop(self) -> None:
         """Bring the arm to rest and take no further command; returns at once."""
-        ...
 
     @abstractmethod
     def give_up(self) -> None:
         """End the controller's program, on an arm at rest; waits for it, but not for ever."""
-        ...
 
 
 class Controller(Protocol):
@@ -152,17 +140,14 @@ class Controller(Protocol):
     @abstractmethod
     def address(self) -> str:
         """By which a person knows it."""
-        ...
 
     @abstractmethod
     def reader(self, rig: Rig) -> ArmReader:
         """The arm to look at, not connected yet."""
-        ...
 
     @abstractmethod
     def follower(self, rig: Rig, tool: Tool) -> PathFollower:
         """The arm to command with a tool in its gripper, not connected yet."""
-        ...
 
 
 class LinkLost(RuntimeError):

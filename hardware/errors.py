@@ -1,5 +1,7 @@
 """Errors of the rig that a person can mend, always a single line."""
 
+from functools import partial
+
 
 class RigError(ValueError):
     """Something that was given, or that is connected, cannot be used.
@@ -18,11 +20,7 @@ class RigError(ValueError):
 
     def __reduce__(self):
         # exceptions cross process borders, and pickle knows positional arguments only
-        return _rebuilt, (type(self), self.what, self.where, self.fix)
-
-
-def _rebuilt(kind: type[RigError], what: str, where: str, fix: str) -> RigError:
-    return kind(what, where=where, fix=fix)
+        return partial(type(self), self.what, where=self.where, fix=self.fix), ()
 
 
 class MotionRejected(RigError):

@@ -1,7 +1,7 @@
 """Results as text, and as HTML in a notebook."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 
 Rows = Sequence[tuple[str, str]]
@@ -20,9 +20,14 @@ class Displayed(ABC):
         return "\n  ".join([type(self).__name__, *rows])
 
     def _repr_html_(self) -> str:
-        cells = "".join(
-            f"<tr><th style='text-align:left'>{escape(what)}</th>"
-            f"<td style='text-align:left'>{escape(value)}</td></tr>"
-            for what, value in self._shown()
-        )
-        return f"<table><caption>{escape(type(self).__name__)}</caption>{cells}</table>"
+        return html_table(type(self).__name__, self._shown())
+
+
+def html_table(title: str, rows: Iterable[tuple[str, object]]) -> str:
+    """A table of two columns for a notebook; its texts are escaped."""
+    cells = "".join(
+        f"<tr><th style='text-align:left'>{escape(what)}</th>"
+        f"<td style='text-align:left'>{escape(str(value))}</td></tr>"
+        for what, value in rows
+    )
+    return f"<table><caption>{escape(title)}</caption>{cells}</table>"

@@ -90,7 +90,6 @@ def check_rheology(effect: Effect) -> None:
 
 
 def _prior_faults(effect: Effect, prior: "Distribution") -> Iterator[str]:
-    """Faults of a prior of the coefficient."""
     from numpyro.distributions import Distribution
 
     if not isinstance(prior, Distribution):

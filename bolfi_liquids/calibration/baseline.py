@@ -175,11 +175,7 @@ def learn_baseline(
 
 
 def _held(path: Path) -> Baseline | None:
-    """The baseline in a file; None where there is none, or it has to be made anew.
-
-    Raises:
-        InputError: The file is something else.
-    """
+    """The baseline in a file; None where there is none, or it has to be made anew."""
     if not path.exists():
         return None
     if not _was_baseline(path):

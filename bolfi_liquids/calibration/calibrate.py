@@ -282,11 +282,7 @@ def _usual_prior(path: Path, resume: bool) -> "Prior":
 
 
 def _open_all(recordings: Source | Sequence[Source]) -> list[Recording]:
-    """Recordings of one liquid, each once.
-
-    Raises:
-        InputError: They cannot be used.
-    """
+    """Recordings of one liquid, each once."""
     opened = open_recordings(recordings)
     if not opened:
         raise InputError("no recording given", where="recordings", fix="give at least one")
@@ -303,11 +299,7 @@ def _open_clean(
     stirring: StirSimulator,
     settings: CalibrationSettings,
 ) -> tuple[list[Recording | Baseline], list[Part]]:
-    """What was given as clean, and the recordings in it beside which a run's can be calibrated.
-
-    Raises:
-        InputError: They cannot be used.
-    """
+    """What was given as clean, and the recordings in it beside which a run's can be calibrated."""
     given = open_clean(baseline)
     if given and settings.surrogate != "signal":
         raise InputError(

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..drawing import shown
+from ..inference.notebook_display import html_table
 from ..run.run import Run, RunOrPath, key_of
 from ..seeds import Phase, generator
-from ..wording import html_table
 from .figures import draw_fit, draw_posterior, draw_search
 from .summary import CalibrationSummary, bad_fit
 
@@ -53,7 +53,7 @@ class Calibration:
         rows = {"run": self.path, **parameters, "sampler": status, "next": status.advice}
         if (bad := bad_fit(self.summary)) is not None:
             rows["warning"] = bad
-        return html_table("Calibration", rows)
+        return html_table("Calibration", rows.items())
 
     @classmethod
     def open(cls, run: RunOrPath) -> "Calibration":

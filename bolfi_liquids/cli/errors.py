@@ -96,11 +96,7 @@ def _misused(err: TyperException) -> typer.Exit:
 
 
 def _check_none_empty(arguments: list[str]) -> None:
-    """Refuse empty arguments: as a path one would mean the current directory.
-
-    Raises:
-        InputError: There is one.
-    """
+    """Refuse empty arguments: as a path one would mean the current directory."""
     for option, value in _values(arguments):
         if not value.strip():
             named = option if option.startswith("-") else "an argument"

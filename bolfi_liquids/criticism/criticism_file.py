@@ -224,7 +224,6 @@ def _effects(source: "inference.criticism.Criticism") -> "Dataset":
 def _status(
     candidate: "inference.criticism.Candidate", source: "inference.criticism.Criticism"
 ) -> EffectStatus:
-    """Status of an explanation by one effect."""
     from ..inference.criticism.verdict import MIN_GAIN
 
     if candidate.names[0] in source.verdict.effects:

@@ -10,9 +10,10 @@ from ..calibration.result import Calibration
 from ..drawing import shown
 from ..errors import InputError
 from ..inference.criticism.verdict_kind import VerdictKind, advice
+from ..inference.notebook_display import html_table
 from ..inputs.prior import PARAMETERS
 from ..run.run import RESULTS, Run, RunOrPath
-from ..wording import html_table, spoken
+from ..wording import spoken
 from . import figures
 from .summary import CriticismSummary
 
@@ -54,7 +55,7 @@ class Criticism:
         }
         if self.effects and not self.summary.coefficient:
             rows["effects"] = ", ".join(map(spoken, self.effects))
-        return html_table("Criticism", rows | {"next": self.advice})
+        return html_table("Criticism", [*rows.items(), ("next", self.advice)])
 
     @classmethod
     def open(cls, run: RunOrPath) -> "Criticism":
@@ -168,11 +169,7 @@ class Criticism:
         return shown(partial(figures.pour_residual_plot, self._of("pours")), axes)
 
     def _of(self, source: str, group: str = "effects") -> "DataTree":
-        """The groups of "stirs" or "pours".
-
-        Raises:
-            ValueError: It was not criticised, or has no such group.
-        """
+        """The groups of "stirs" or "pours"."""
         if f"/{source}/{group}" not in self.tree.groups:
             option = group if group == "held_out" else source
             raise ValueError(f"nothing was found on {option}; criticise the run with {option}")

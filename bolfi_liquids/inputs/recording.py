@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..wording import html_table
+from ..inference.notebook_display import html_table
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -91,7 +91,7 @@ class Recording:
         return f"Recording({str(self.path)!r}: {told})"
 
     def _repr_html_(self) -> str:
-        return html_table("Recording", {"file": self.path, **self.subjects()})
+        return html_table("Recording", [("file", self.path), *self.subjects().items()])
 
     def subjects(self) -> dict[str, str]:
         """Texts about the recording by subject, as far as the file has them."""
@@ -107,8 +107,7 @@ class Recording:
 
     def values(self, name: str) -> NDArray[np.float64]:
         """A variable of its file, with SI units, shape (T,)."""
-        columns = (self.time, *self.gripper.position.T, *self.inclination.T)
-        return dict(zip(UNITS, columns, strict=True))[name]
+        return along_path(self, self.inclination)[name]
 
     def number(self, name: str) -> float:
         """A numeric attribute, in SI units."""

@@ -123,11 +123,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
 
 
 def _counted(run: Path, cups: "Cups", given: PourTable | None) -> PourTable | None:
-    """The given pours that count with these cups, or those that the run keeps; logs the others.
-
-    Raises:
-        InputError: They were made with these cups, but by none of the actions that may be chosen.
-    """
+    """The given pours that count with these cups, or those that the run keeps; logs the others."""
     if (table := given or kept_pours(run, cups)) is None:
         if (run / GIVEN_POURS).is_file():
             logger.warning("%s: its pours were made with other cups; not used", run / GIVEN_POURS)

@@ -123,9 +123,7 @@ def draw_map(axes: "Axes", x: NDArray, y: NDArray, percent: NDArray) -> "QuadCon
     return shades
 
 
-def not_surely_worse(
-    spilled: NDArray, risk: str, chosen: tuple[int, int], seed: int = 0
-) -> NDArray[np.bool_]:
+def not_surely_worse(spilled: NDArray, risk: str, chosen: tuple[int, int]) -> NDArray[np.bool_]:
     """Actions that these draws do not show, at `SURE`, to be worse than the chosen one.
 
     The difference of two actions is paired by draw, which removes what all actions spill of a
@@ -135,14 +133,13 @@ def not_surely_worse(
         spilled: Of each draw, shape (draws, W, D).
         risk: Which measure of `spillage.RISK` is compared.
         chosen: Row and column of the chosen action.
-        seed: Of the bootstrap.
 
     Returns:
         Shape (W, D); none of them where there are fewer than `MIN_COMPARED_DRAWS` draws.
     """
     if len(spilled) < MIN_COMPARED_DRAWS:
         return np.zeros(spilled.shape[1:], bool)
-    again = generator(seed, Phase.BOOTSTRAP).integers(
+    again = generator(0, Phase.BOOTSTRAP).integers(
         len(spilled), size=(BOOTSTRAP_SAMPLES, len(spilled))
     )
     risks = np.stack([RISK[risk](spilled[draws]) for draws in again])

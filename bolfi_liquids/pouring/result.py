@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.summary import FitStatus
+from ..inference.notebook_display import html_table
 from ..run.given_pours import UNITS
 from ..run.results import Number, Section
 from ..run.run import Run, RunOrPath
-from ..wording import html_table
 from .given import GivenPours
 from .pours import Hold
 from .spillage import ACTION, FRACTIONS, Judged, Surface
@@ -66,7 +66,7 @@ class Pour:
 
     def _repr_html_(self) -> str:
         rows = {"run": self.path, "chosen": self.chosen, "best at θ* alone": self.plug_in}
-        return html_table("Pour", rows)
+        return html_table("Pour", rows.items())
 
     @classmethod
     def open(cls, run: RunOrPath) -> "Pour":

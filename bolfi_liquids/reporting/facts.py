@@ -331,7 +331,6 @@ def _held_out(source: "DataTree") -> list[Facts]:
 
 
 def _effects(source: "DataTree") -> list[Facts]:
-    """Each effect considered for a source."""
     return [
         {
             "name": spoken(one["effect"]),

@@ -34,13 +34,13 @@ def write_board(path: Path) -> Path:
 
 
 @contextmanager
-def _refused(*kinds: type[Exception], where: str, fix: str) -> Iterator[None]:
-    """Turn these errors of hardware into a `RigError` that names what to mend."""
+def _refused(kind: type[Exception], where: str, fix: str) -> Iterator[None]:
+    """Turn such an error of hardware into a `RigError` that names what to mend."""
     from ..hardware import RigError
 
     try:
         yield
-    except kinds as err:
+    except kind as err:
         raise RigError(str(err), where=where, fix=fix) from err
 
 
@@ -66,12 +66,7 @@ def calibrate_view(
     Raises:
         RigError: The rig, the camera or the pictures cannot be used.
     """
-    from ..hardware.vision import (
-        CalibrationError,
-        CharucoBoard,
-        PlumbLineError,
-        calibrate_intrinsics,
-    )
+    from ..hardware.vision import CalibrationError, CharucoBoard, calibrate_intrinsics
     from ..hardware.vision.stick_view import camera_model, orientation
 
     camera = rig_of(rig).camera(view)
@@ -82,8 +77,7 @@ def calibrate_view(
     else:
         on_board = [] if boards is None else _read(boards)
         thread = None if plumb_line is None else _read(plumb_line)[0]
-    errors, again = (CalibrationError, PlumbLineError), "take the pictures again"
-    with _refused(*errors, where=f"camera {view}", fix=again):
+    with _refused(CalibrationError, where=f"camera {view}", fix="take the pictures again"):
         if on_board:
             lens = calibrate_intrinsics(on_board, board)
             beside = Path() if rig is None else Path(rig).parent
@@ -95,11 +89,7 @@ def calibrate_view(
 
 
 def _read(path: Path) -> list[np.ndarray]:
-    """All pictures of a directory, of a video, or the one of a file; grey levels.
-
-    Raises:
-        RigError: It cannot be used.
-    """
+    """All pictures of a directory, of a video, or the one of a file; grey levels."""
     from ..hardware.cameras import CameraError, FilesCamera
 
     with _refused(CameraError, where=str(path), fix="give a directory of pictures"):
@@ -107,11 +97,7 @@ def _read(path: Path) -> list[np.ndarray]:
 
 
 def _taken(camera: "Camera") -> tuple[list[np.ndarray], np.ndarray]:
-    """Pictures of the board and of the plumb line, grey levels, each once a person is ready.
-
-    Raises:
-        RigError: The camera cannot be used.
-    """
+    """Pictures of the board and of the plumb line, grey levels, each once a person is ready."""
     from ..hardware.cameras import CameraError, open_camera
 
     how = "hold it still, tilted, then press Enter "

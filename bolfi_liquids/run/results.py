@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import BeforeValidator, TypeAdapter
 
-from ..files import write_text, write_whole
-from ..hardware.netcdf import netcdf_content
+from ..files import write_whole
+from ..hardware.whole_files import netcdf_content
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -86,11 +86,6 @@ class Section:
 @cache
 def _adapter(kind: type) -> TypeAdapter:
     return TypeAdapter(kind)
-
-
-def write_summary(path: Path, sections: Mapping[str, Any]) -> None:
-    """Write all sections, by the names of their commands."""
-    write_text(path, json.dumps(sections, indent=2, allow_nan=False) + "\n")
 
 
 def generations() -> dict[str, str]:

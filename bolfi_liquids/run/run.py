@@ -33,7 +33,7 @@ from ..inputs.settings import CalibrationSettings, CriticismSettings, PourSettin
 from ..simulators import own_versions
 from ..wording import command
 from .given_pours import GIVEN_POURS, digest_of_pours
-from .results import SUMMARY_FILE, generations, read_result, write_result, write_summary
+from .results import SUMMARY_FILE, generations, read_result, write_result
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -205,11 +205,7 @@ class Run:
             yield run
 
     def _continued(self, wanted: Mapping[str, Any], ends: tuple[str, ...]) -> Mapping[str, Any]:
-        """The held record, or the wanted one with the held date where its ends are others.
-
-        Raises:
-            InputError: They differ otherwise; the message names the first field.
-        """
+        """The held record, or the wanted one with the held date where its ends are others."""
         differing = _differences(self.record, wanted)
         others = {field for field, pair in differing.items() if _goes_on(field, pair, ends)}
         differing = {field: pair for field, pair in differing.items() if field not in others}
@@ -350,7 +346,8 @@ class Run:
             step: json.loads(tree.attrs["summary"]) for step, tree in trees if tree is not None
         }
         if found:  # else numbers of a run that is growing stay until it has others
-            write_summary(self.path / SUMMARY_FILE, found)
+            text = json.dumps(found, indent=2, allow_nan=False)
+            write_text(self.path / SUMMARY_FILE, f"{text}\n")
 
     @property
     def made_from(self) -> dict[str, Any]:
@@ -443,11 +440,7 @@ class Run:
         return ""
 
     def _check_generation(self) -> None:
-        """Refuse a run of another version of fluid or engine.
-
-        Raises:
-            InputError: Versions differ; the message has the command that calibrates anew.
-        """
+        """Refuse a run of another version of fluid or engine."""
         now, simulators = generations(), self.record.get("simulator", {}).values()
         made_by = [("model", one["model"]) for one in simulators if "model" in one]
         if engine := self.record.get("engine", {}).get("version"):
@@ -514,11 +507,7 @@ def _run_near(path: Path) -> Path | None:
 
 
 def _record_of(path: Path) -> Path:
-    """The file of a run's settings.
-
-    Raises:
-        InputError: There is none.
-    """
+    """The file of a run's settings."""
     if not (path / RUN_TOML).is_file():
         usual = "give the directory of a run, as made by: bolfi-liquids calibrate ... --out RUN"
         raise InputError(f"no {RUN_TOML} in it", where=str(path), fix=_way_out(path) or usual)
@@ -526,11 +515,7 @@ def _record_of(path: Path) -> Path:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """run.toml.
-
-    Raises:
-        InputError: There is none, it is not TOML, or it was cut off.
-    """
+    """run.toml."""
     file, record = _record_of(path), {}
     try:
         record = tomllib.loads(file.read_text(encoding="utf-8"))

@@ -276,11 +276,7 @@ def described_liquids(values: Mapping[str, ArrayLike], **shared: Any) -> Liquids
 
 
 def _column(name: str, value: ArrayLike) -> NDArray:
-    """`value` as an array, shape () or (B,); `Described` looks at each seed.
-
-    Raises:
-        InputError: It is complex, text, of no one shape, of several dimensions, or empty.
-    """
+    """`value` as an array, shape () or (B,); `Described` looks at each seed."""
     fix = "give a number, or an array of them"
     try:
         seeds = name == "seed"
@@ -354,11 +350,7 @@ def _told_apart(made: "Dataset", liquids: Liquids) -> "Dataset":
 def _checked_files(
     movie: str | Path | None, out: str | Path | None, liquids: Liquids
 ) -> tuple[Path | None, Path | None]:
-    """Refuse a movie and a table that could not be written, before anything is simulated.
-
-    Raises:
-        InputError, ImportError: Where and why.
-    """
+    """Refuse a movie and a table that could not be written, before anything is simulated."""
     if movie is not None:
         movie = given_path(movie, Argument("movie"))
         check_movie(movie)
@@ -377,12 +369,7 @@ def _checked_files(
 def _with_rig(
     attrs: Mapping[str, float | str], rig: Mapping[str, float] | None
 ) -> dict[str, float | str]:
-    """A recording's attributes with those of a rig in their place.
-
-    Raises:
-        InputError: They are no sizes by name, a name is none of `RIG_SIZES`, a value is no positive
-            number, or the stick's mass and density are both given.
-    """
+    """A recording's attributes with those of a rig in their place."""
     sizes = {} if rig is None else rig
     if not isinstance(sizes, Mapping):
         raise InputError(f"{rig!r:.80}", where=Argument("rig"), fix="give sizes by name")

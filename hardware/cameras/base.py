@@ -23,12 +23,10 @@ class FrameSource(Protocol):
         Raises:
             CameraError: the camera fails.
         """
-        ...
 
     @abstractmethod
     def close(self) -> None:
         """Let the device or file go; harmless when repeated."""
-        ...
 
 
 def grey(image: np.ndarray) -> np.ndarray:

@@ -1,15 +1,13 @@
 """From the directory of a session to a recording: whatever the session has left."""
 
-import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..netcdf import netcdf_content
 from ..rig import Rig
 from ..vision.frame import BAD_LINE, Flag
+from ..whole_files import write_netcdf
 from .directory import VIEWS
 from .events import drop_reserve, outcome, read_events
 from .stir import Raw, Stir, extract_stir, lost_rows, missed, read_raw
@@ -44,7 +42,7 @@ def finalise(directory: str | Path) -> Path:
     stir = extract_stir(raw, str(directory))
     drop_reserve(directory)  # room for the recording, where the disk is full
     dataset = _as_dataset(stir, _attributes(directory, raw, stir))
-    return _write_whole(dataset, directory / RECORDING)
+    return write_netcdf(dataset, directory / RECORDING)
 
 
 def partial(directory: str | Path, until: float = np.inf) -> Stir:
@@ -136,19 +134,3 @@ def _as_dataset(stir: Stir, attributes: dict[str, float | int | str]) -> "Datase
     }
     dataset["flags"] = ("time", stir.flags.astype(np.int32), attrs)
     return dataset
-
-
-def _write_whole(dataset: "Dataset", path: Path) -> Path:
-    content = netcdf_content(dataset)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        temporary.write_bytes(content)
-        temporary.chmod(0o644)  # mkstemp's own mode hides it from a group
-        temporary.replace(path)
-    except OSError as err:
-        raise OSError(err.errno, err.strerror, str(path)) from err
-    finally:
-        temporary.unlink(missing_ok=True)
-    return path

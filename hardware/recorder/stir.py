@@ -246,11 +246,6 @@ def _way_near(samples: Columns, span: Span) -> Trajectory:
 
 
 def _delay(raw: Raw, view: View, span: Span, series: FrameSeries) -> Delay:
-    """Delay of a camera.
-
-    Raises:
-        RigError: It cannot be found.
-    """
     fault = raw.faults[view]
     try:
         return fit_delay(

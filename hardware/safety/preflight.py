@@ -119,10 +119,11 @@ def process_checks(rows: Mapping[Who, Row], rig: Rig, now: float) -> list[Check]
     return checks
 
 
-def disk_check(directory: Path, need: float = LEAST_DISK) -> Check:
-    """Whether the disk has room [bytes]."""
+def disk_check(directory: Path) -> Check:
+    """Whether the disk has room."""
     free = shutil.disk_usage(directory).free
-    return Check("disk", free >= need, f"{free / 1e6:.0f} MB free, {need / 1e6:.0f} MB needed")
+    text = f"{free / 1e6:.0f} MB free, {LEAST_DISK / 1e6:.0f} MB needed"
+    return Check("disk", free >= LEAST_DISK, text)
 
 
 def failures(checks: list[Check]) -> str:

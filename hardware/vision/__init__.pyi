@@ -2,7 +2,6 @@ from .calibration import CalibrationError as CalibrationError
 from .calibration import CharucoBoard as CharucoBoard
 from .calibration import Intrinsics as Intrinsics
 from .calibration import Levelled as Levelled
-from .calibration import PlumbLineError as PlumbLineError
 from .calibration import calibrate_intrinsics as calibrate_intrinsics
 from .calibration import level_camera as level_camera
 from .camera_model import CameraModel as CameraModel

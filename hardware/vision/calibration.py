@@ -209,10 +209,6 @@ def _check_tilt(turns: np.ndarray) -> None:
         )
 
 
-class PlumbLineError(ValueError):
-    """The picture shows no plumb line that can be used."""
-
-
 class Levelled(NamedTuple):
     """A camera put right by a plumb line.
 
@@ -238,12 +234,12 @@ def level_camera(image: np.ndarray, camera: CameraModel, *, width: float = 4.0) 
         width: Of the thread [px], about.
 
     Raises:
-        PlumbLineError: there is no thread, or too little of it.
+        CalibrationError: there is no thread, or too little of it.
     """
     from scipy.spatial.transform import Rotation
 
     if image.shape != camera.size[::-1]:
-        raise PlumbLineError(
+        raise CalibrationError(
             f"the picture has shape {image.shape}, the camera model {camera.size[::-1]}"
         )
     line = _thread(image, camera, width)
@@ -264,7 +260,7 @@ def _correction(line: Line, camera: CameraModel) -> float:
     c = normal[2] * down[2]
     size = float(np.hypot(a, b))
     if not size > abs(c):
-        raise PlumbLineError("the camera looks straight up or down: a plumb line shows no roll")
+        raise CalibrationError("the camera looks straight up or down: a plumb line shows no roll")
     # a cos + b sin = -c has two roots; the other one is upside down
     middle, half = np.arctan2(b, a), np.arccos(-c / size)
     roots = (np.array([middle - half, middle + half]) + np.pi) % (2 * np.pi) - np.pi
@@ -280,7 +276,7 @@ def _thread(image: np.ndarray, camera: CameraModel, width: float) -> Line:
     far = 2.0 * image.shape[0]
     ray = search_rays(lines, starts, middle, rows, width=SEARCH_WIDTH, length=far)
     if ray.response < LEAST_RESPONSE:
-        raise PlumbLineError(
+        raise CalibrationError(
             "no plumb line was found: hang a thread, dark before a bright background, through "
             "the whole picture"
         )
@@ -288,7 +284,7 @@ def _thread(image: np.ndarray, camera: CameraModel, width: float) -> Line:
     line = fit_line(camera.undistort(points))
     count = int(line.inlier.sum())
     if count < LEAST_SHARE * image.shape[0] or line.slope_error > MOST_ERROR:
-        raise PlumbLineError(
+        raise CalibrationError(
             f"the plumb line is seen in {count} of {image.shape[0]} rows; it must be straight and "
             "free over at least half of them"
         )

@@ -141,20 +141,19 @@ def _lens(camera: Camera) -> CameraModel:
     return lens
 
 
-def stick_view(rig: Rig, view: View, camera: CameraModel | None = None) -> StickView:
+def stick_view(rig: Rig, view: View) -> StickView:
     """View of a rig's camera before its first picture.
 
     Args:
         rig: Its sizes.
         view: Which camera.
-        camera: Its lens and place; those of the rig where it is not given.
 
     Raises:
         RigError: See `camera_model`.
     """
     return StickView(
         scene(rig, view),
-        camera or camera_model(rig.camera(view)),
+        camera_model(rig.camera(view)),
         # the wall of the cup bends what is seen through it
         surface_height=rig.cup.height,
         contrast=rig.stick.colour,

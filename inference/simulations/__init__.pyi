@@ -1,10 +1,8 @@
 from .bank import Simulation as Simulation
-from .bank import SimulationBank as SimulationBank
 from .bank import Simulations as Simulations
 from .compute import Compute as Compute
 from .compute import Workers as Workers
 from .compute import open_compute as open_compute
-from .compute import open_executor as open_executor
 from .job import BatchSimulator as BatchSimulator
 from .job import Job as Job
 from .job import OneByOne as OneByOne
@@ -12,5 +10,4 @@ from .job import columns as columns
 from .job import jobs as jobs
 from .job import stacked as stacked
 from .job import succeeded as succeeded
-from .runner import Runner as Runner
 from .runner import run_missing as run_missing

@@ -3,11 +3,7 @@ from .base import Family as Family
 from .base import Measured as Measured
 from .base import Surrogate as Surrogate
 from .base import TrainingData as TrainingData
-from .discrepancy import DiscrepancyFamily as DiscrepancyFamily
-from .log_likelihood import LogLikelihoodFamily as LogLikelihoodFamily
 from .signal import SignalFamily as SignalFamily
-from .squared_difference import squared_difference as squared_difference
 from .threshold import Matched as Matched
 from .threshold import Predicted as Predicted
 from .threshold import Quantile as Quantile
-from .warnings import EmulatorWarning as EmulatorWarning

@@ -59,17 +59,14 @@ class Surrogate(Protocol):
     @abstractmethod
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new simulation at u [n, d], each [n, ...]."""
-        ...
 
     @abstractmethod
     def fantasize(self, u: np.ndarray) -> "Surrogate":
         """The surrogate after its own predictions at u [n, d] came true (pending points)."""
-        ...
 
     @abstractmethod
     def best(self) -> np.ndarray:
         """The u [d] that fits best."""
-        ...
 
     def warnings(self, *, confirmed: bool = False) -> list[str]:
         """Warnings, in sentences.

@@ -96,11 +96,7 @@ def _load(path: str) -> None:
 
 
 def _defined_in(path: str) -> Effect:
-    """What a file calls EFFECT.
-
-    Raises:
-        ValueError: it defines none, or fails.
-    """
+    """What a file calls EFFECT."""
     spec = spec_from_file_location(Path(path).stem, path)
     if spec is None or spec.loader is None:
         raise ValueError(NO_EFFECT)

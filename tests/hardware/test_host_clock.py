@@ -1,8 +1,5 @@
 """The clock that a test steps; the real one is the computer's."""
 
-import time
-
-from bolfi_liquids.hardware.process import RealClock
 from stepped_clock import SteppedClock
 
 
@@ -23,10 +20,3 @@ def test_who_stands_still_does_not_stop_the_others():
     clock.sleep(2.0)
     # the sleeper wakes up late, since the stall was its own
     assert (clock.now(), ticks) == (4.5, [1.0, 2.0, 3.0, 4.0])
-
-
-def test_the_real_clock_is_the_computer_s():
-    clock, before = RealClock(), time.monotonic()
-    clock.sleep(0.01)
-    clock.sleep(-1.0)
-    assert before + 0.01 <= clock.now() <= time.monotonic()

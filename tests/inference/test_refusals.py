@@ -26,6 +26,8 @@ from bolfi_liquids.inference.simulations import (
     open_compute,
 )
 from bolfi_liquids.inference.simulations.job import for_engine
+from bolfi_liquids.inference.surrogates import Quantile
+from bolfi_liquids.inference.surrogates.threshold import Matched, Predicted
 
 from bolfi_liquids import inference
 
@@ -208,7 +210,14 @@ VALUES = {
         *({"timeout": "60"}, {"executor": 4}, {"executor": ProcessPoolExecutor}),
         *({"vectorised": "no"}, {"in_rounds": None}, {"warn": 1}),
         *({"progress": None}, {"progress": 1}, {"progress": "bar"}),
-        *({"noise": "loud"}, {"noise": -0.1}, {"noise": np.ones((2, 2))}),
+        *({"noise": noise} for noise in ("loud", -0.1, {"sd": 1.0}, np.ones((2, 2)), np.ones(31))),
+        *({"noise": noise} for noise in (-np.eye(30), np.triu(np.ones((30, 30))), 0.1 - OBSERVED)),
+        *(
+            {"noise": np.nan * OBSERVED},
+            {"noise": inference.relative(0.2), "observed": 0 * OBSERVED},
+        ),
+        *({"noise": "poisson", "observed": -OBSERVED - 1.0}, {"noise": lambda mean: -mean - 1.0}),
+        *({"noise": lambda mean: np.nan * mean}, {"noise": lambda mean: mean[:3] + 1.0}),
         *({"components": 0}, {"components": 2.5}, {"predicted": 1.0}, {"predicted": np.nan}),
         *({"summary": np.zeros(3)}, {"summary": lambda signal: "loud"}),
         *({"discrepancy": "squared"}, {"threshold": "best"}, {"threshold": lambda values: 0.1}),
@@ -217,7 +226,14 @@ VALUES = {
     ],
     "fit, log likelihood": [{"observed": [0.0]}],
     "Fit.sample": [
-        *({"sampler": ["nuts"]}, {"chains": 1}, {"draws": 3}, {"draws": 10**12}, {"draws": 1e3}),
+        *(
+            {"sampler": "gibbs"},
+            {"sampler": ["nuts"]},
+            {"chains": 1},
+            {"draws": 3},
+            {"draws": 10**12},
+            {"draws": 1e3},
+        ),
         *({"warmup": 0}, {"extend": 0}, {"seed": -1}, {"warn": "no"}),
     ],
     "fit_losses": [
@@ -289,13 +305,29 @@ VALUES = {
     "for_engine, wrapped": [
         *({"together": 4}, {"time_limit": max}, {"vectorised": False}),
     ],
-    "shared_design": [{"n": 10**6}, {"n": 2}, {"prior": 3}],
+    "DiscrepancyFamily": [
+        *({"threshold": "nonsense"}, {"threshold": np.nan}, {"threshold": Quantile(1.5)}),
+        *({"threshold": Predicted(0.0)}, {"threshold": Matched(0.0)}),
+        *({"transform": "cube"}, {"discrepancy": 3.0}),
+    ],
+    "shared_design": [
+        *({"n": 10**6}, {"n": 2}, {"prior": 3}, {"batch": 0}, {"timeout": 0}, {"progress": None}),
+        *((name, {"options": {name: 4}}) for name in ("nosie", "seed", "batch", "earlier")),
+        *({"executor": 3}, ("chain", {"sampling": {"chain": 2}})),
+    ],
     "coverage": [{"levels": 0.9}, {"levels": [0.5, 1.0]}, {"levels": []}, {"alpha": 0}],
     "sbc": [{"quantities": {"b": 3}}, {"quantities": [np.mean]}, {"alpha": 1.0}],
-    "FitPipeline": [{"options": {"budget": 3}}, {"sampling": {"draw": 3}}, {"prior": "flat"}],
-    "LowerConfidenceBound": [{"jitter": np.inf}, {"jitter": "small"}],
-    "PosteriorDraws": [{"share": None}, {"share": np.nan}],
-    "CautiousDraws": [{"share": None}, {"share": np.nan}],
+    "FitPipeline": [
+        *({"options": {"budget": 3}}, {"sampling": {"draw": 3}}, {"prior": "flat"}, {"budget": -2}),
+        *(
+            {"simulate": 3},
+            ("nosie", {"options": {"nosie": 1}}),
+            ("seed", {"sampling": {"seed": 2}}),
+        ),
+    ],
+    "LowerConfidenceBound": [{"jitter": 0.0}, {"jitter": np.inf}, {"jitter": "small"}],
+    "PosteriorDraws": [{"share": 1.5}, {"share": None}, {"share": np.nan}],
+    "CautiousDraws": [{"share": -0.1}, {"share": None}, {"share": np.nan}],
 }
 
 

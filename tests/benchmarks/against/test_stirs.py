@@ -43,9 +43,6 @@ def test_a_liquid_that_warms_is_as_thin_at_the_end_as_the_table_says(grid):
     assert stir.thinnest == pytest.approx(0.025)
 
 
-GEL = "gel_v10.nc,any,12,0.0503"
-
-
 def edit(folder, old, new):
     table = folder / "truths.csv"
     assert old in table.read_text()

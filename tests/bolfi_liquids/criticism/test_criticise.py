@@ -18,7 +18,6 @@ from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.open import open_recordings
 from bolfi_liquids.inputs.settings import CriticismSettings
-from bolfi_liquids.run.run import Run
 
 HEADER = "angular_velocity_deg_s,distance_cm,spilled,received,retained"
 ROWS = ["45,1,5,90,5", "90,2,10,85,5", "60,3,20,75,5"]
@@ -201,13 +200,3 @@ def test_what_is_held_out_or_clean_in_a_wrong_frame_is_told(calibration, caplog)
                 bl.criticise(calibration, progress=False, timeout=-1.0, **{option: one})
             notices = [record.getMessage() for record in caplog.records]
             assert len(notices) == count and all(text.startswith("other.nc: ") for text in notices)
-
-
-def test_a_run_keeps_its_recordings_and_refuses_a_changed_copy(calibration, tmp_path):
-    (kept,) = calibration.run.recordings
-    assert [kept.hash] == calibration.record["inputs"]["sha256"]
-    (tmp_path / "recordings").mkdir()
-    (tmp_path / "recordings" / kept.path.name).write_bytes(kept.path.read_bytes())
-    record = {**calibration.record, "inputs": {"sha256": ["another"]}}
-    with pytest.raises(InputError, match=kept.path.name):
-        _ = Run(tmp_path, record).recordings

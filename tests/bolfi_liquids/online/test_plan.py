@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.motion import star
 
-from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.recording import planned_recording
 from bolfi_liquids.online.plan import (
     MAX_DELAY_CHANGE,
@@ -147,11 +146,3 @@ def test_what_is_no_recording_is_refused():
         aligned = align(PLAN, ENDS, odd)
         assert why in aligned.refusal and aligned.strokes == 0
         assert np.isnan(aligned.observed).all()
-
-
-def test_a_plan_needs_a_density_and_a_path():
-    rows = ((PATH.time, {}, "liquid_density"), (PATH.time[::-1], ATTRS, "planned path"))
-    for time, attrs, where in rows:
-        with pytest.raises(InputError) as refused:
-            planned_recording(time, PATH.position, attrs)
-        assert where in refused.value.where

@@ -5,7 +5,7 @@ from jinja2 import UndefinedError
 
 from bolfi_liquids.pouring.parcels import PARCELS
 from bolfi_liquids.reporting.prose import prose
-from bolfi_liquids.wording import LEAST_SPILLED, degrees, listed, percent, spilled, with_unit
+from bolfi_liquids.wording import LEAST_SPILLED, degrees, percent, spilled, with_unit
 
 
 def test_a_fact_or_a_chapter_that_is_missing_is_refused():
@@ -33,8 +33,3 @@ def test_numbers_carry_their_units():
     assert LEAST_SPILLED == 0.5 / PARCELS
     assert spilled(0.0) == spilled(0.99 * LEAST_SPILLED) != spilled(LEAST_SPILLED)
     assert spilled(0.03) == percent(0.03)
-
-
-def test_names_are_listed():
-    rows = {("a",): "a", ("a", "b_c"): "a and b c", ("a", "b", "c"): "a, b and c"}
-    assert {names: listed(names) for names in rows} == rows

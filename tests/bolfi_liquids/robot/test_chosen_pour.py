@@ -101,14 +101,6 @@ def test_a_stale_pour_is_never_carried_out(poured_run, made_from):
             bl.execute_pour(poured_run, **who)
 
 
-def test_a_damaged_pour_is_one_line(poured_run):
-    whole = (poured_run / "pour.nc").read_bytes()
-    (poured_run / "pour.nc").write_bytes(whole[:5000] + bytes([whole[5000] ^ 1]) + whole[5001:])
-    with pytest.raises(InputError, match=r"pour\.nc is damaged") as caught:
-        bl.execute_pour(poured_run, ask=refused)
-    assert "\n" not in str(caught.value)
-
-
 BAD = {"calibrate": {"fit_rms_deg": 2.1, "noise_deg": 0.24}, "pour": {"fit_status": "bad"}}
 
 

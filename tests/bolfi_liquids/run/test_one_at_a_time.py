@@ -1,10 +1,5 @@
 """Whatever writes into a run keeps others out of it, so that nothing of either is lost."""
 
-import shutil
-import signal
-import subprocess
-import sys
-import time
 from importlib.resources import files
 from pathlib import Path
 
@@ -71,41 +66,3 @@ def test_a_mistyped_run_is_not_made(tmp_path):
         with pytest.raises(InputError, match="mien"):
             call()
     assert list(tmp_path.iterdir()) == []
-
-
-REPORT = """
-import sys
-import bolfi_liquids as bl
-bl.report(sys.argv[1], moving=False)
-"""
-
-
-def is_held(run):
-    """Whether a command works in a run."""
-    try:
-        with alone_in(run):
-            return False
-    except InputError:
-        return True
-
-
-@pytest.mark.slow
-def test_of_two_commands_at_once_one_is_refused_and_nothing_is_lost(calibration, tmp_path):
-    """A report is stopped in the middle of its work; while it holds the run, all others try."""
-    run = shutil.copytree(calibration.path, tmp_path / "run")
-    report = [sys.executable, "-c", REPORT, str(run)]
-    with subprocess.Popen(report, stderr=subprocess.DEVNULL) as first:
-        while not is_held(run):
-            assert first.poll() is None
-            time.sleep(0.01)
-        first.send_signal(signal.SIGSTOP)
-        try:
-            for call, typed in commands_in(run).values():
-                with pytest.raises(InputError, match="another command"):
-                    call()
-                assert CliRunner().invoke(app, typed).exit_code == 2
-        finally:
-            first.send_signal(signal.SIGCONT)
-        assert first.wait() == 0
-    assert (run / "report.html").exists()
-    assert (run / "summary.json").read_bytes() == (calibration.path / "summary.json").read_bytes()

@@ -96,13 +96,6 @@ def test_finished_run_is_opened_not_repeated(short_recording, calibration, setti
     assert again.summary == calibration.summary
 
 
-def test_another_seed_is_refused_and_changes_nothing(short_recording, calibration, settings):
-    other = settings | {"seed": 4}
-    with pytest.raises(ValueError, match=r"settings\.seed is 5 in the run, but 4"):
-        bl.calibrate(short_recording, out=calibration.path, resume=True, progress=False, **other)
-    assert bl.Calibration.open(calibration.path).summary == calibration.summary
-
-
 @pytest.mark.slow
 def test_a_larger_budget_goes_on_from_a_smaller_one(
     short_recording, calibration, settings, tmp_path

@@ -12,7 +12,6 @@ from functools import partial
 import numpy as np
 import pytest
 import tomli_w
-from bolfi_liquids.inference import engine_version
 from bolfi_liquids.inference.simulations.bank import Simulation
 from bolfi_liquids.models import effects
 from xarray import Dataset, DataTree
@@ -239,12 +238,6 @@ def test_a_lock_ends_with_its_process(tmp_path):
     assert begin(run, resume=True).record == RECORD
 
 
-def test_one_process_keeps_itself_out_too(tmp_path):
-    with alone_in(tmp_path), pytest.raises(InputError, match="another command"):
-        with alone_in(tmp_path):
-            raise AssertionError("two are in it")
-
-
 def test_what_is_no_directory_is_refused_at_once(tmp_path):
     (tmp_path / "file").touch()
     (tmp_path / "dangling").symlink_to(tmp_path / "nowhere")
@@ -325,12 +318,6 @@ def test_a_run_of_another_generation_is_refused_with_the_way_out(run, part):
         with pytest.raises(InputError, match=f"made by {part} 0.*calibrate again: ") as refused:
             read(path)
         assert "recordings/1-short.nc" in refused.value.fix
-
-
-def test_another_engine_goes_on_with_no_run(run, short_recording, settings, monkeypatch):
-    monkeypatch.setattr(engine_version, "ENGINE_VERSION", "0")
-    with pytest.raises(InputError, match=r"engine"):
-        bl.calibrate(short_recording, out=run.path, resume=True, progress=False, **settings)
 
 
 def test_every_byte_of_a_result_counts(run, tmp_path):

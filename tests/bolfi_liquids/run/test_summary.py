@@ -7,7 +7,6 @@ import numpy as np
 
 from bolfi_liquids.calibration.summary import CalibrationSummary
 from bolfi_liquids.criticism.summary import CriticismSummary
-from bolfi_liquids.run.results import write_summary
 
 
 def test_sections_survive_writing_and_reading(calibration, criticism_summary, pour):
@@ -21,14 +20,6 @@ def test_what_json_cannot_hold_is_null_and_comes_back(calibration):
     section = replace(calibration.summary, rhat_max=np.nan).to_json()
     assert section["rhat_max"] is None
     assert np.isnan(CalibrationSummary.from_json(section).rhat_max)
-
-
-def test_the_file_is_replaced_whole(tmp_path):
-    path = tmp_path / "summary.json"
-    for sections in ({"calibrate": {"seed": 1}}, {"pour": {"distance_cm": 2.0}}):
-        write_summary(path, sections)
-        assert json.loads(path.read_text(encoding="utf-8")) == sections
-    assert [one.name for one in tmp_path.iterdir()] == ["summary.json"]
 
 
 def test_effects_that_were_considered(criticism_summary):

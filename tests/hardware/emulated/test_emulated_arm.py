@@ -9,7 +9,6 @@ from bolfi_liquids.hardware.errors import RigError
 from bolfi_liquids.hardware.motion.poses import cup_frame
 from bolfi_liquids.hardware.motion.pour_paths import ready_to_pour
 from bolfi_liquids.hardware.motion.stir_paths import stir, strokes
-from bolfi_liquids.hardware.robot.ur import STOP_DECELERATION
 from bolfi_liquids.hardware.safety.guards import PLAYING
 from stepped_clock import SteppedClock
 
@@ -72,18 +71,6 @@ def test_what_the_arm_cannot_do_is_a_protective_stop(arm_and_clock, monkeypatch)
     assert arm.read().speed == 0.0
     with pytest.raises(LinkLost):
         arm.command(PATH[SOON])
-
-
-def test_a_stop_takes_what_the_driver_s_deceleration_takes(arm_and_clock):
-    arm, clock = arm_and_clock
-    follow(arm, clock, PATH[:SOON])
-    speed = arm.read().speed
-    assert speed > 0.05
-    arm.stop()
-    clock.sleep(speed / STOP_DECELERATION - 2 * PERIOD)
-    assert arm.read().speed > 0.0
-    clock.sleep(4 * PERIOD)
-    assert arm.read().speed == 0.0
 
 
 def test_the_force_is_noise_of_its_seed():

@@ -37,7 +37,6 @@ ANSWERS = {
     "10": (LIES, f"{CONTROL}played_one_after_the_other", f"{CONTROL}rehearsal_bears_a_stall"),
     # a NaN pose is accepted: paths are checked as a whole and each set-point in the driver
     "11": (
-        f"{DRIVER}breaks_a_limit_is_not_sent",
         f"{ARMS}set_point_that_breaks_a_limit",
         f"{LIMITS}set_point_that_breaks_a_limit",
     ),

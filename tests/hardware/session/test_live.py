@@ -50,12 +50,6 @@ def test_trouble_takes_the_place_of_numbers():
     assert "camera yz shows" in lines["stopped"]
 
 
-def test_nothing_has_begun():
-    lines = shown("starting", status_of([Row() for _ in Who]))
-    assert "0 %" in lines["path"]
-    assert all("no sign yet" in lines[name] for name in ("robot", "recorder", "camera yz"))
-
-
 def test_a_guard_changes_its_colour_before_it_stops_the_arm_and_an_old_sign_of_life_is_red():
     for value, style in ((4.0, "green"), (17.0, "yellow"), (20.0, "red"), (30.0, "red")):
         table = live_table("", status_of(ROWS, Reading("force", value, 20.0, "N")), 10.0)

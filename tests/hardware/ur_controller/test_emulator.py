@@ -177,17 +177,6 @@ def test_receiver_gives_up_a_frozen_link_after_2_5_s(emulator):
     del receive
 
 
-def test_senseless_bytes_close_only_their_own_connection(emulator):
-    for port, data in ((30004, b"\x00\x01\x00"), (30004, b"\x00\x05\x99ab"), (29997, b"{\n")):
-        with socket.create_connection((emulator.address, port), timeout=5) as link:
-            link.sendall(data)
-            try:
-                assert link.recv(1000) == b""
-            except ConnectionResetError:
-                pass
-    assert emulator.admin.state().runtime_state == 1
-
-
 PARENT = """
 import time
 from ur_controller.process import ControllerProcess

@@ -87,37 +87,6 @@ def test_pipelines_travel_to_spawned_processes(monkeypatch):
             )
 
 
-def test_a_pipeline_that_can_only_fail_is_refused(simulate, prior):
-    for change, named in (
-        ({"budget": -2}, "budget"),
-        ({"simulate": 3}, "simulate"),
-        ({"options": {"nosie": 1}}, "nosie"),
-        ({"options": {"budget": 9}}, "budget"),
-        ({"sampling": {"chain": 2}}, "chain"),
-        ({"sampling": {"seed": 2}}, "seed"),
-    ):
-        with pytest.raises(ValueError, match=named):
-            inference.FitPipeline(**{"simulate": simulate, "prior": prior, **change})
-
-
-def test_a_design_that_can_only_fail_is_refused_before_it_is_simulated(prior):
-    calls = []
-    for wrong, named in (
-        ({"options": {"nosie": 1}}, "nosie"),
-        ({"options": {"seed": 4}}, "seed"),
-        ({"options": {"batch": 4}}, "batch"),
-        ({"options": {"earlier": 3}}, "earlier"),
-        ({"sampling": {"chain": 2}}, "chain"),
-        ({"batch": 0}, "batch"),
-        ({"timeout": 0}, "timeout"),
-        ({"progress": None}, "progress"),
-        ({"executor": 3}, "executor"),
-    ):
-        with pytest.raises(ValueError, match=named):
-            inference.shared_design(lambda *given: calls.append(given), prior, 5, **wrong)
-    assert calls == []
-
-
 def test_a_design_s_simulations_are_kept_batch_by_batch(simulate, prior):
     """What was finished before a crash is not simulated again, and the bank stays open."""
     made, told = [], []

@@ -95,23 +95,6 @@ def test_means_go_to_the_scale_and_back():
         np.testing.assert_allclose(step, 0.05, rtol=0.05)
 
 
-@pytest.mark.parametrize(
-    ("noise", "observed"),
-    [
-        ("gauss", COUNTS),
-        ("poisson", -COUNTS - 1.0),
-        (lambda mean: -mean, COUNTS + 1.0),
-        (lambda mean: np.nan * mean, COUNTS),
-        (lambda mean: mean[:3], COUNTS),
-        (relative(0.2), np.zeros(12)),
-    ],
-    ids=["text", "negative counts", "negative sds", "nan", "too few sds", "no noise at 0"],
-)
-def test_other_noise_is_refused(noise, observed):
-    with pytest.raises(ValueError, match="^noise"):
-        inference.Bolfi(PRIOR, observed, noise=noise)
-
-
 def test_a_share_is_positive():
     with pytest.raises(ValueError, match="share must be positive"):
         inference.relative(0.0)

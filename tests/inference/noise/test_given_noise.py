@@ -8,8 +8,6 @@ from bolfi_liquids.inference.surrogates import SignalFamily
 from bolfi_liquids.inference.surrogates.noise.given import given_noise
 from bolfi_liquids.inference.surrogates.output_vectors import MAX_VALUES, describe
 
-from bolfi_liquids import inference
-
 RNG = np.random.default_rng(0)
 
 
@@ -69,23 +67,6 @@ def test_a_long_series_needs_no_matrix():
     finally:
         tracemalloc.stop()
     assert scale.given.white.shape == (MAX_VALUES,) and peak < 50e6
-
-
-@pytest.mark.parametrize(
-    "noise",
-    [
-        {"sd": 1.0},
-        -0.5,
-        np.full((20, 2), np.nan),
-        np.ones(40),
-        -np.eye(38),
-        np.triu(np.ones((38, 38))),
-    ],
-    ids=["no number", "negative", "nan", "of another shape", "not definite", "not symmetric"],
-)
-def test_other_noise_is_refused(prior, gappy, noise):
-    with pytest.raises(ValueError, match="noise must be"):
-        inference.Bolfi(prior, gappy, noise=noise)
 
 
 def test_noise_that_reads_two_ways_is_refused():

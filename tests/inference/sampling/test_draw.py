@@ -283,12 +283,3 @@ def test_log_prob_is_prior_times_likelihood(line_fit):
     np.testing.assert_allclose(values[:2], np.log(0.5) + norm.logcdf(z), rtol=1e-6)
     assert values[2] == -np.inf
     assert line_fit.log_prob({"slope": 0.2, "offset": 0.7}).shape == ()
-
-
-@pytest.mark.parametrize(
-    ("option", "value"),
-    [("sampler", "gibbs"), ("chains", 1), ("draws", 3), ("extend", 0), ("warn", "yes")],
-)
-def test_bad_options_are_refused(line_fit, option, value):
-    with pytest.raises(ValueError, match=f"{option} must be"):
-        line_fit.sample(**{option: value})

@@ -128,18 +128,6 @@ def options(executor):
     return {"budget": BUDGET, "confirm": 0, "initial": INITIAL, "executor": executor, **flying}
 
 
-@pytest.mark.slow
-def test_an_executor_has_the_bits_of_none(prior, observed, simulate):
-    given = {"budget": 8, "initial": 5, "batch": 3}
-    plain = inference.fit(simulate, prior, observed, **given)
-    told = []
-    with ThreadPoolExecutor(3) as pool:
-        given |= {"executor": pool, "progress": told.append}
-        spread = inference.fit(dithering(simulate), prior, observed, **given)
-    assert_same(plain, spread)
-    assert told == [1] * len(spread.history.theta)
-
-
 def test_keeps_batch_in_flight_and_no_more(prior, observed, simulate):
     """Runs 0 to 2 wait for one another, so all three must run at once; a fourth never does."""
     together, lock, flying, most = threading.Barrier(3), threading.Lock(), [0], [0]

@@ -73,23 +73,6 @@ def test_threshold_rules():
         np.testing.assert_allclose(found, expected)
 
 
-@pytest.mark.parametrize(
-    ("option", "value"),
-    [
-        ("threshold", "nonsense"),
-        ("threshold", inference.surrogates.Quantile(1.5)),
-        ("threshold", Predicted(0.0)),
-        ("threshold", Matched(0.0)),
-        ("threshold", np.nan),
-        ("transform", "cube"),
-        ("discrepancy", 3.0),
-    ],
-)
-def test_bad_options_are_refused(option, value):
-    with pytest.raises(ValueError, match=f"{option} must be"):
-        inference.DiscrepancyFamily(**{option: value})
-
-
 def test_a_threshold_that_the_transform_cannot_take_is_refused():
     with pytest.raises(ValueError, match="threshold .* must be positive"):
         with_threshold(learn(U, DELTA, "log"), -1.0)

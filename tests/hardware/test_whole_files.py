@@ -5,7 +5,7 @@ import io
 import numpy as np
 import pytest
 import xarray as xr
-from bolfi_liquids.hardware.netcdf import netcdf_content
+from bolfi_liquids.hardware.whole_files import netcdf_content
 from distributed import LocalCluster
 
 DATA = xr.Dataset({"angle": ("time", np.linspace(0.0, 1.0, 7))}, {"time": np.arange(7.0)})
