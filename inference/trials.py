@@ -92,6 +92,7 @@ def from_trials(
         ValueError: bad argument or losses, see `fit_losses`; several objectives; parameters that
             some complete trials lack; without a prior, a table, or a study that searched whole
             numbers, choices, or ranges that changed.
+        OSError: there is no such file.
 
     Warns:
         EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
@@ -149,8 +150,10 @@ def _of_table(table: Any, prior: Prior | None) -> tuple[Theta, Any]:
     due = "be an Optuna study, a table, or the path of a CSV file"
     require(is_table(table), "trials", due, table)
     require(prior is not None, "prior", "be given with a table, which has no search ranges", prior)
-    columns = [*getattr(prior, "names", ()), "loss"]
-    held = list(table.keys())
+    names, held = getattr(prior, "names", ()), list(table.keys())
+    cure = "rename that parameter: the column holds losses"
+    require("loss" not in names, "prior", "have no parameter `loss`", names, cure=cure)
+    columns = [*names, "loss"]
     due = f"have the columns {columns}"
     require(set(columns) <= set(held), "trials", due, held, cure="rename what has another name")
     return {name: table[name] for name in columns[:-1]}, table["loss"]

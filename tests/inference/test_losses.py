@@ -291,6 +291,13 @@ def test_a_frame_and_its_file_give_what_the_study_gives(study, tmp_path):
         np.testing.assert_array_equal(fit.log_prob(at), expected.log_prob(at))
 
 
+def test_a_parameter_is_not_taken_for_the_losses():
+    prior = inference.Prior({"loss": dist.Uniform(0.0, 1.0), "gain": dist.Uniform(0.0, 1.0)})
+    table = {name: np.linspace(0.1, 0.9, 9) for name in prior.names}
+    with pytest.raises(ValueError, match="no parameter `loss`.*rename"):
+        inference.from_trials(prior, table, noise=0.1)
+
+
 def of_whole_numbers(trial):
     return trial.suggest_float("a", -3, 3) ** 2 + trial.suggest_int("layers", 1, 3)
 
