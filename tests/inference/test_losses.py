@@ -339,6 +339,12 @@ def test_a_study_that_says_no_posterior_is_refused_with_the_cure(objective, how,
         inference.from_trials(None, made, noise=1.0)
 
 
+def test_a_study_is_read_with_a_prior_of_its_own_parameters_alone():
+    made = study_of(of_whole_numbers, n=12)
+    with pytest.raises(ValueError, match=r"prior must have the parameters .*'layers'"):
+        inference.from_trials(inference.Prior({"a": dist.Uniform(-3, 3)}), made, noise=1.0)
+
+
 def test_whole_numbers_are_read_with_a_prior():
     made = study_of(of_whole_numbers, n=12)
     prior = inference.Prior({"a": dist.Uniform(-3, 3), "layers": dist.Uniform(0.5, 3.5)})
