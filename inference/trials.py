@@ -126,8 +126,8 @@ def _log_likelihoods(
     cure = (
         "give noise= for a perfect fit"
         if least == 0.0
-        else "leave such trials out, or is it a study that maximises sums of squares? To minus a log "
-        "likelihood, whatever its sign, belongs from_trials(log_likelihood=True)"
+        else "leave such trials out; a study of sums of squares must minimise; and minus a log "
+        "likelihood goes in by from_trials(log_likelihood=True)"
     )
     fits = least > 0.0 or (least == 0.0 and noise is not None)
     require(fits, "loss", due, float(least), cure=cure)
