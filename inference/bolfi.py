@@ -13,7 +13,7 @@ from scipy.special import ndtr
 from ._float64 import in_float64
 from .acquisition.replicates import next_replicate
 from .acquisition.rules import chosen, resolve_acquisition
-from .arguments import check_flag, checked_integer, checked_mapping, require
+from .arguments import check_flag, checked_integer, checked_mapping, checked_number, require
 from .describe import describe
 from .history import UNKNOWN, History, told_errors, told_seeds, told_signals
 from .learning import key_words, learned_from, training_data
@@ -347,7 +347,10 @@ class Bolfi(Displayed):
             EmulatorWarning: for each of the surrogate's complaints, unless warn=False; they are
                 in `Fit.warnings` in any case.
         """
-        measured = checked_mapping("seconds", seconds, "times [s]")
+        measured = {
+            part: checked_number(f"seconds[{part!r}]", spent, np.isfinite, "a time [s]")
+            for part, spent in checked_mapping("seconds", seconds, "times [s]").items()
+        }
         check_flag("warn", warn)
         stacklevel = checked_integer("stacklevel", stacklevel)
         if self.succeeded < MIN_LEARN:

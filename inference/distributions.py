@@ -131,8 +131,8 @@ def describe(distribution: dist.Distribution) -> str:
 
 
 def _transform(transform: Any) -> str:
-    held = {key: value for key, value in vars(transform).items() if np.ndim(value) == 0}
-    numbers = [f"{key}={value}" for key, value in held.items() if np.isreal(value)]
+    held = {key: np.asarray(value) for key, value in vars(transform).items()}
+    numbers = [f"{key}={v}" for key, v in held.items() if v.ndim == 0 and v.dtype.kind in "biuf"]
     return f"{type(transform).__name__}({', '.join(numbers)})"
 
 

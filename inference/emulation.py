@@ -19,15 +19,17 @@ class Emulation:
 
     Attributes:
         prior: Of the parameters; its quantiles are what the processes know.
-        left_out: What the other runs predict of each run, [n, m].
+        left_out: What the other runs predict of each run, [n, m]; NaN of one that is not finite.
         missed: Output of each run less that, [n, m]: the error of the emulation, chance between
             runs included.
     """
 
-    def __init__(self, prior: Prior, learned: Emulator):
+    def __init__(self, prior: Prior, learned: Emulator, finite: np.ndarray):
         self.prior, self._learned = prior, learned
-        self.left_out = learned.left_out()
-        self.missed = learned.outputs - self.left_out
+        self.left_out = np.full((len(finite), learned.outputs.shape[1]), np.nan)
+        self.left_out[finite] = learned.left_out()
+        self.missed = np.full_like(self.left_out, np.nan)
+        self.missed[finite] = learned.outputs - self.left_out[finite]
 
     @in_float64
     def predict(self, theta: Theta) -> np.ndarray:
@@ -44,12 +46,12 @@ def emulate(prior: Prior, theta: Theta, outputs: ArrayLike, scale: ArrayLike) ->
     Args:
         prior: Gives names, ranges and scales of the parameters.
         theta: Name -> [n], in the prior's support.
-        outputs: [n, m]; a row that is not finite is left out.
-        scale: [m], positive: differences that count alike.
+        outputs: [n, m]; nothing is learned from a row that is not finite.
+        scale: [m], positive and finite: differences that count alike.
 
     Raises:
         ValueError: shapes disagree, fewer than three finite rows, theta outside the support, or a
-            scale that is not positive.
+            scale that is not positive and finite.
 
     Example:
         >>> import numpy as np
@@ -67,16 +69,16 @@ def emulate(prior: Prior, theta: Theta, outputs: ArrayLike, scale: ArrayLike) ->
     rows = checked_prior(prior).to_dict(np.atleast_2d(prior.to_array(theta)))
     known, weights = checked_array("outputs", outputs), checked_array("scale", scale)
     n = len(next(iter(rows.values())))
-    alike = known.ndim == 2 and len(known) == n
+    alike = known.ndim == 2 and len(known) == n and known.size
     require(alike, "outputs", f"have shape ({n}, m), a row per theta", known.shape)
     finite = np.isfinite(known).all(axis=1)
     usable = int(finite.sum())
     due = f"be finite for {MIN_VALUES} theta"
     require(usable >= MIN_VALUES, "outputs", due, usable, cure="make more")
     check_support(prior, rows)
-    positive = weights.shape == known.shape[1:] and (weights > 0.0).all()
-    due = f"hold {known.shape[1]} positive numbers, one per output"
+    positive = weights.shape == known.shape[1:] and ((weights > 0.0) & (weights < np.inf)).all()
+    due = f"hold {known.shape[1]} positive and finite numbers, one per output"
     require(positive, "scale", due, weights)
     limits, u = EmulatorLimits(COMPONENTS, predicted=None), prior.to_unit(rows)[finite]
     learned = vectors.emulate(u, known[finite], lambda _: weights, limits, None, prior.tails)
-    return Emulation(prior, learned)
+    return Emulation(prior, learned, finite)

@@ -32,10 +32,12 @@ class _Chooser(Messenger):
     def process_message(self, msg: Message) -> None:
         if msg["type"] == "deterministic":
             return
-        if msg["type"] != "sample" or msg["is_observed"]:
+        plain = msg["type"] == "sample" and msg["value"] is None and msg["scale"] is None
+        if not plain or msg["kwargs"]["sample_shape"]:
             raise ValueError(
                 f"the model of a prior must have scalar parameters alone, got the {msg['type']} "
-                f"{msg['name']!r}: a loop of `numpyro.sample` stands for a plate, a conditional or "
-                "truncated distribution for a factor, and what was observed is for `fit`"
+                f"{msg.get('name')!r}: a loop of `numpyro.sample` stands for a plate or a shape, a "
+                "conditional or truncated distribution for a factor or a scale, a number for a "
+                "parameter whose value is set, and what was observed is for `fit`"
             )
         msg["value"], msg["stop"] = self.choose(msg["name"], msg["fn"]), True

@@ -499,6 +499,7 @@ class Fit(Displayed):
             The page.
 
         Raises:
+            ValueError: bad argument, or draws of another fit.
             OSError: it cannot be written.
         """
         from .fit_report import write_report
@@ -506,6 +507,9 @@ class Fit(Displayed):
         check_kind("path", path, str | Path)
         if tree is not None:
             check_kind("tree", tree, xr.DataTree)
+            held = tree["posterior"].attrs if "posterior" in tree.children else {}
+            own = np.isclose(held.get("log_evidence", np.inf), self.evidence.log, equal_nan=True)
+            require(own, "tree", "be what `sample` of this fit has returned", tree)
         return write_report(path, self, self.sample(warn=False) if tree is None else tree)
 
     def save(self, path: str | Path) -> Path:

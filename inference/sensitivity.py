@@ -14,7 +14,7 @@ from .surrogates.base import Surrogate
 if TYPE_CHECKING:
     import xarray
 
-MIN_VARIANCE = 1e-12  # of a value, over its squared size: less is rounding
+MIN_VARIANCE = 1e-24  # of a value, over its squared size: less is rounding
 
 
 def sobol_indices(prior: Prior, learned: Surrogate, n: int, seed: int) -> "xarray.Dataset":

@@ -140,9 +140,9 @@ def _opened(path: str | Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         made = json.loads(arrays.pop(MADE))
+        version = made["engine_version"]
     except UNREADABLE as error:
         raise ValueError(f"path must be a file of Fit.save, got {str(path)!r}") from error
-    version = made["engine_version"]
     if version != ENGINE_VERSION:
         raise ValueError(
             f"path {str(path)!r} was saved by version {version} of the engine, and this is version "
@@ -197,7 +197,9 @@ def _family(
         family, looked_at = resolve(name, {**stored, **given}), given
     else:
         family = resolve(surrogate, given)
-        looked_at = vars(family)
+        looked_at, name = vars(family), family.name or type(family).__name__
+        due = f"be {settings['surrogate']!r}, as stored"
+        require(name == settings["surrogate"], "surrogate", due, name)
     for name in looked_at:
         got = describe(vars(family)[name])
         require(got == settings.get(name), name, f"be {settings.get(name)}, as stored", got)

@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike
 
 from .arguments import check_flag, checked_array, checked_integer, checked_number, is_table, require
 from .bolfi import MIN_LEARN, Bolfi
-from .prior import Prior
+from .prior import Prior, checked_prior
 from .result import Fit
 from .types import Theta
 
+ONE_CHOICE = "of several choices take the trials of one, as a data frame with a column `loss`"
 OTHERWISE = (
-    "give a prior, in which a whole number from 1 to 20 is Uniform(0.5, 20.5); of several choices "
-    "take the trials of one, as a data frame with a column `loss`"
+    f"give a prior, in which a whole number from 1 to 20 is Uniform(0.5, 20.5); {ONE_CHOICE}"
 )
 """The cure where the search space of a study is no prior."""
 
@@ -92,13 +92,16 @@ def from_trials(
         ValueError: bad argument or losses, see `fit_losses`; several objectives; parameters that
             some complete trials lack; without a prior, a table, or a study that searched whole
             numbers, choices, or ranges that changed.
+        OSError: there is no such file.
 
     Warns:
         EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
     """
     is_study = hasattr(trials, "trials") and hasattr(trials, "directions")
     theta, loss = _of_study(trials) if is_study else _of_table(trials, prior)
-    prior = _search_ranges(trials) if prior is None else prior
+    prior = _search_ranges(trials) if prior is None else checked_prior(prior)
+    due = f"have the parameters of the trials, {tuple(theta)}"
+    require(set(prior.names) == set(theta), "prior", due, prior.names)
     return _fit(prior, theta, _log_likelihoods(loss, noise, n, log_likelihood), warn)
 
 
@@ -121,8 +124,10 @@ def _log_likelihoods(
     least = np.nanmin(losses)
     due = f"hold sums of squares, {'positive' if noise is None else 'from 0'}"
     cure = (
-        "leave such trials out, give noise= for a perfect fit, or give minus a log likelihood, its "
-        'sign changed, to fit(surrogate="log_likelihood")'
+        "give noise= for a perfect fit"
+        if least == 0.0
+        else "leave such trials out; a study of sums of squares must minimise; and minus a log "
+        "likelihood goes in by from_trials(log_likelihood=True)"
     )
     fits = least > 0.0 or (least == 0.0 and noise is not None)
     require(fits, "loss", due, float(least), cure=cure)
@@ -149,10 +154,13 @@ def _of_table(table: Any, prior: Prior | None) -> tuple[Theta, Any]:
     due = "be an Optuna study, a table, or the path of a CSV file"
     require(is_table(table), "trials", due, table)
     require(prior is not None, "prior", "be given with a table, which has no search ranges", prior)
-    columns = [*getattr(prior, "names", ()), "loss"]
-    held = list(table.keys())
+    names, held = getattr(prior, "names", ()), list(table.keys())
+    cure = "rename that parameter: the column holds losses"
+    require("loss" not in names, "prior", "have no parameter `loss`", names, cure=cure)
+    columns = [*names, "loss"]
     due = f"have the columns {columns}"
-    require(set(columns) <= set(held), "trials", due, held, cure="rename what has another name")
+    cure = "rename what has another name, or give an Optuna study itself"
+    require(set(columns) <= set(held), "trials", due, held, cure=cure)
     return {name: table[name] for name in columns[:-1]}, table["loss"]
 
 
@@ -170,12 +178,13 @@ def _of_study(study: Any) -> tuple[Theta, np.ndarray]:
 def _finished(study: Any) -> list[Any]:
     """Trials that are complete, and those that failed with all parameters chosen."""
     complete = [trial for trial in study.trials if trial.state.name == "COMPLETE"]
-    require(complete, "trials", "hold complete ones", len(study.trials), cure="optimise first")
+    due = f"hold complete ones among {len(study.trials)}"
+    require(complete, "trials", due, 0, cure="optimise first")
     names = complete[0].params.keys()
     for trial in complete:
         alike = trial.params.keys() == names
         due = f"all have the parameters {tuple(names)}"
-        require(alike, "trials", due, tuple(trial.params), cure=OTHERWISE)
+        require(alike, "trials", due, tuple(trial.params), cure=ONE_CHOICE)
     failed = [t for t in study.trials if t.state.name == "FAIL" and t.params.keys() == names]
     return complete + failed
 

@@ -27,7 +27,7 @@ class Until:
             expected regret of what is to be decided, in its own units, infinite while unknown.
 
     Raises:
-        ValueError: a tolerance that is not positive, or bad numbers.
+        ValueError: a tolerance that is not positive and finite, or bad numbers.
     """
 
     tolerance: float = 0.25
@@ -35,7 +35,8 @@ class Until:
     error: Callable[[Fit], float] | None = None
 
     def __post_init__(self) -> None:
-        checked_number("tolerance", self.tolerance, lambda t: 0.0 < t < np.inf, "positive")
+        due = "positive and finite"
+        checked_number("tolerance", self.tolerance, lambda t: 0.0 < t < np.inf, due)
         checked_integer("most", self.most, MIN_LEARN, MOST_SIMULATIONS)
         check_callable("error", self.error)
 

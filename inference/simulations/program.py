@@ -123,13 +123,10 @@ class _Run:
         """Raises RunFailed, or TimeoutError where it was overdue."""
         with TemporaryDirectory(prefix="program-", ignore_cleanup_errors=True) as made:
             directory = Path(made)
-            kept = None if self.keep is None else self.keep / directory.name
             try:
                 return self._simulate(directory, theta, seed)
             except BaseException as error:
-                told = _explained(error, directory, kept)
-                if kept is not None:
-                    shutil.copytree(directory, kept, symlinks=True)
+                told = _explained(error, directory, self.keep)
                 if isinstance(error, Exception) and not isinstance(error, TimeoutError):
                     raise RunFailed(told) from error
                 raise
@@ -150,7 +147,8 @@ class _Run:
         return _numbers(directory / ("out" if "out" in self.named else "stdout"))
 
     def check(self, parameters: Collection[str]) -> None:
-        """Raise ValueError for a name in braces that is none, and for a parameter without use."""
+        """Raise ValueError for a name or a format in braces that is none, and for a parameter
+        without use."""
         due = f"not be named {sorted(FILES)}"
         require(not FILES & set(parameters), "parameters", due, [*parameters])
         known = {*parameters, "seed", *FILES}
@@ -160,6 +158,15 @@ class _Run:
         unused = sorted(set(parameters) - set(self.named))
         due = "all be in braces in the command or its input"
         require(told or not unused, "parameters", due, unused)
+        numbers = {**dict.fromkeys(parameters, 0.5), "seed": 1, **dict.fromkeys(FILES, "")}
+        for text in (*self.words, self.write if isinstance(self.write, str) else ""):
+            try:
+                text.format_map(numbers)
+            except ValueError as error:
+                raise ValueError(
+                    f"formats in braces must be those of numbers, such as {{a:.3f}}, got {text!r} "
+                    f"({error})"
+                ) from error
 
 
 def _execute(words: Sequence[str], directory: Path) -> None:
@@ -212,14 +219,24 @@ def _numbers(path: Path) -> np.ndarray:
     return np.loadtxt(path, ndmin=1)
 
 
-def _explained(error: BaseException, directory: Path, kept: Path | None) -> str:
-    """What happened, the end of stderr, and where the files of the run are."""
+def _explained(error: BaseException, directory: Path, keep: Path | None) -> str:
+    """What happened, the end of stderr, and where the files of the run are kept."""
     path = directory / "stderr"
     said = path.read_bytes().decode(errors="replace") if path.exists() else ""
     tail = "\n".join(said.strip().splitlines()[-TAIL:])[-TAIL_LETTERS:]
     what = f"{error}" if isinstance(error, RunFailed) else f"{type(error).__name__}: {error}"
-    files = "" if kept is None else f"; its files are in {kept}"
-    return f"{what}{files}{tail and f'; stderr ends:\n{tail}'}"
+    return f"{what}{_kept(directory, keep)}{tail and f'; stderr ends:\n{tail}'}"
+
+
+def _kept(directory: Path, keep: Path | None) -> str:
+    """Copy the files of a run that failed; returns where they are, for a message."""
+    if keep is None:
+        return ""
+    try:
+        copied = shutil.copytree(directory, keep / directory.name, symlinks=True)
+    except OSError as error:  # a pipe is among them, or the disk is full: not why the run failed
+        return f"; not all of its files could be kept in {keep} ({error})"
+    return f"; its files are in {copied}"
 
 
 def _from_here(word: str) -> str:

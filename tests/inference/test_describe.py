@@ -37,6 +37,10 @@ SAID = [
 
 def test_says_what_it_is_and_no_address():
     assert [describe(value) for value, _ in SAID] == [text for _, text in SAID]
+    shifted = dist.TransformedDistribution(dist.Normal(0.0, 1.0), AffineTransform(0.5, 2.0))
+    inference.Prior({"a": shifted})  # uses the transform's inverse, to which it then refers
+    text = "TransformedDistribution(Normal(loc=0, scale=1), AffineTransform(loc=0.5, scale=2.0))"
+    assert describe(shifted) == text
     assert "0x" not in describe(Plain()) + describe(lambda x: x)
 
 

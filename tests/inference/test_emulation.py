@@ -51,5 +51,13 @@ def test_a_run_that_is_not_finite_is_left_out():
     outputs = curve(THETA)
     outputs[9, 3] = np.nan
     learned = inference.emulate(PRIOR, THETA, outputs, ONE)
-    assert learned.left_out.shape == (49, 30)
     np.testing.assert_allclose(learned.predict(FRESH), curve(FRESH), atol=0.02)
+    others = np.arange(50) != 9  # each of which keeps its row
+    np.testing.assert_allclose(learned.left_out[others], curve(THETA)[others], atol=0.1)
+    assert np.isnan(learned.left_out[9]).all() and np.isnan(learned.missed[9]).all()
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1.0, np.inf, np.nan])
+def test_a_scale_that_is_none_is_refused(wrong):
+    with pytest.raises(ValueError, match="scale must hold 30 positive and finite numbers"):
+        inference.emulate(PRIOR, THETA, curve(THETA), np.append(ONE[1:], wrong))

@@ -6,6 +6,7 @@ from html.parser import HTMLParser
 import numpy as np
 import numpyro.distributions as dist
 import pytest
+import xarray as xr
 
 from bolfi_liquids import inference
 
@@ -83,6 +84,19 @@ def test_the_same_fit_gives_the_same_page(page, fit, tmp_path):
     path, tree = page
     again = fit.report(tmp_path / "again.html", tree)
     assert again.read_bytes() == path.read_bytes()
+
+
+def test_draws_of_another_fit_are_refused(fit, page, tmp_path):
+    engine = inference.Bolfi(fit.prior, fit.observed, noise=0.5)  # the same runs, other noise
+    engine.tell(fit.prior.to_dict(fit.history.theta), fit.history.signals)
+    other = engine.fit(warn=False).sample("quadrature", draws=20)
+    for wrong in (other, type(other)(), page[1]["posterior"]):
+        with pytest.raises(ValueError, match="tree must be what `sample` of this fit"):
+            fit.report(tmp_path / "out.html", wrong)
+    page[1].to_netcdf(tmp_path / "draws.nc")
+    with xr.open_datatree(tmp_path / "draws.nc") as tree:
+        again = fit.report(tmp_path / "again.html", tree)
+    assert again.read_bytes() == page[0].read_bytes()
 
 
 @pytest.mark.parametrize(

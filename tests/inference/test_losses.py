@@ -291,6 +291,13 @@ def test_a_frame_and_its_file_give_what_the_study_gives(study, tmp_path):
         np.testing.assert_array_equal(fit.log_prob(at), expected.log_prob(at))
 
 
+def test_a_parameter_is_not_taken_for_the_losses():
+    prior = inference.Prior({"loss": dist.Uniform(0.0, 1.0), "gain": dist.Uniform(0.0, 1.0)})
+    table = {name: np.linspace(0.1, 0.9, 9) for name in prior.names}
+    with pytest.raises(ValueError, match="no parameter `loss`.*rename"):
+        inference.from_trials(prior, table, noise=0.1)
+
+
 def of_whole_numbers(trial):
     return trial.suggest_float("a", -3, 3) ** 2 + trial.suggest_int("layers", 1, 3)
 
@@ -330,6 +337,12 @@ def test_a_study_that_says_no_posterior_is_refused_with_the_cure(objective, how,
     made = study_of(objective, n=12, **how)
     with pytest.raises(ValueError, match=f"(?s)trials must .*{told}"):
         inference.from_trials(None, made, noise=1.0)
+
+
+def test_a_study_is_read_with_a_prior_of_its_own_parameters_alone():
+    made = study_of(of_whole_numbers, n=12)
+    with pytest.raises(ValueError, match=r"prior must have the parameters .*'layers'"):
+        inference.from_trials(inference.Prior({"a": dist.Uniform(-3, 3)}), made, noise=1.0)
 
 
 def test_whole_numbers_are_read_with_a_prior():

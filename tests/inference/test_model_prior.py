@@ -9,6 +9,7 @@ import numpy as np
 import numpyro
 import numpyro.distributions as dist
 import pytest
+from numpyro import handlers
 from numpyro.infer import Predictive
 from numpyro.infer.util import log_density
 from scipy import stats
@@ -182,6 +183,14 @@ def a_vector():
     numpyro.sample("a", dist.Normal(jnp.zeros(3), 1.0))
 
 
+def a_shape():
+    numpyro.sample("a", dist.Normal(), sample_shape=(3,))
+
+
+def a_key():
+    numpyro.sample("a", dist.Uniform(0.0, jax.random.uniform(numpyro.prng_key())))
+
+
 def a_parameter():
     numpyro.sample("a", dist.Normal(numpyro.param("place", 0.0), 1.0))
 
@@ -221,6 +230,10 @@ def the_same_twice():
         (a_factor, "scalar parameters alone, got the sample 'small'.* truncated distribution"),
         (an_observation, "scalar parameters alone, got the sample 'a'.* for `fit`"),
         (a_plate, "got the plate 'groups'.* a loop"),
+        (a_shape, "got the sample 'a'.* a shape"),
+        (handlers.scale(chain, 0.5), "got the sample 'a'.* a scale"),
+        (handlers.substitute(chain, {"b": 0.1}), "got the sample 'b'.* whose value is set"),
+        (a_key, "got the prng_key"),
         (a_parameter, "got the param 'place'"),
         (a_vector, r"'a' must be univariate with shape \(\), got \(3,\)"),
         (a_branch, r"take arrays \[n\].*jnp.where"),

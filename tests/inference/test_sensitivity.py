@@ -72,6 +72,17 @@ def test_what_does_not_vary_has_no_index_and_a_discrepancy_has_one():
     assert scalar["total"].squeeze()[0] > 0.9
 
 
+def test_an_offset_changes_no_index():
+    """Of an air pressure [Pa] that sound changes by 1e-7 of itself."""
+    prior = inference.Prior({"a": dist.Uniform(0.0, 1.0), "b": dist.Uniform(0.0, 1.0)})
+
+    def pressure(theta, seeds):
+        return 101325.0 + 0.01 * np.stack([theta["a"], theta["a"] + 2.0 * theta["b"]], axis=1)
+
+    found = fitted(pressure, prior, 12, noise=1e-3).sobol(256)
+    np.testing.assert_allclose(found["first"].T, [[1.0, 0.0], [0.2, 0.8]], atol=0.02)
+
+
 def test_where_nothing_varies_there_are_no_indices():
     prior = inference.Prior({"a": dist.Uniform(0.0, 1.0)})
     with pytest.raises(ValueError, match="varies"):

@@ -174,6 +174,26 @@ def test_another_engine_s_fit_and_other_files_are_refused(line_fit, tmp_path):
         Fit.load(tmp_path / "none")
 
 
+def test_another_surrogate_with_the_same_options_is_refused(line_fit, tmp_path):
+    class Other(type(line_fit.family)):
+        name = "other"
+
+    path = line_fit.save(tmp_path / "fit")
+    assert_same(line_fit, Fit.load(path, surrogate=line_fit.family))
+    for wrong, named in ((Other(**vars(line_fit.family)), "other"), ("signal", "signal")):
+        with pytest.raises(ValueError, match=f"surrogate must be 'discrepancy'.*got '{named}'"):
+            Fit.load(path, surrogate=wrong)
+
+
+def test_times_of_any_library_are_kept(line_fit, tmp_path):
+    engine = inference.Bolfi(line_fit.prior, line_fit.observed)
+    engine.tell(line_fit.prior.to_dict(line_fit.history.theta), line_fit.history.signals)
+    fit = engine.fit({"simulator": np.float32(1.5)}, warn=False)
+    assert Fit.load(fit.save(tmp_path / "fit")).seconds == fit.seconds
+    with pytest.raises(ValueError, match=r"seconds\['simulator'\] must be a time"):
+        engine.fit({"simulator": "long"})
+
+
 def test_nothing_is_left_of_a_file_that_could_not_be_written(line_fit, tmp_path):
     with pytest.raises(OSError):
         line_fit.save(tmp_path)

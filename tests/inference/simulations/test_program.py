@@ -171,6 +171,16 @@ def test_the_end_of_stderr_is_kept_and_the_files_where_wanted(here):
     assert len(list((here / "failed").iterdir())) == 1
 
 
+def test_files_that_cannot_be_kept_do_not_hide_why_a_run_failed(here):
+    (here / "file").touch()
+    for keep, command in (("failed", "mkfifo {a}; echo lost >&2"), ("file", "echo {a} lost >&2")):
+        run = one(Program(f"sh -c '{command}; exit 3'", keep=keep), {"a": 0.5})
+        assert "exit code 3; not all of its files could be kept" in run.error.text
+        assert "lost" in run.error.text
+    (kept,) = (here / "failed").iterdir()
+    assert (kept / "stderr").read_text() == "lost\n"
+
+
 def ended(pid, within=10.0):
     """Whether a process has ended; one that nobody has waited for counts."""
     last = time.monotonic() + within
@@ -243,7 +253,12 @@ def test_nothing_goes_on_after_python_is_killed(here, how):
 
 def test_a_misspelt_parameter_costs_no_simulation(here):
     prior = inference.Prior({"rate": dist.Uniform(0.0, 1.0)})
-    for command, told in {"touch {rat}": "names in braces.*rat", "touch b": "parameters"}.items():
+    for command, told in {
+        "touch {rat}": "names in braces.*rat",
+        "touch b": "parameters",
+        "touch {rate:d}": "formats in braces.*{rate:d}.*'d'",
+        "touch {rate} {out:.2f}": "formats in braces.*{out:.2f}",
+    }.items():
         program = Program(f"{command} {here}/ran")
         for make in (
             lambda program: inference.fit(program, prior, [0.5], progress=False),
