@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from engines import ENGINES
-from report import admitted, holm, report, scores, summary
+from report import admitted, holm, report, scores, summary, task_table
 from tasks import TASKS
 
 HERE = Path(__file__).parent
@@ -123,6 +123,13 @@ def test_a_run_of_more_simulations_than_asked_is_not_compared():
     assert len(admitted(rows)[1]) == 2
     for engine, needed in {"vbmc": 25, "elfi": 33}.items():
         assert f"`{engine}` is left out on gauss2 at N = 20: it needs {needed} simulations" in text
+
+
+def test_every_task_is_told():
+    text = "\n".join(task_table([(task, 20) for task in TASKS]))
+    assert lines(text, "slcp")[0][1:] == ["5", "5", "simulator", "sbibm T.3"]
+    assert lines(text, "pendobs3")[0][1:4] == ["3", "180", "data, known covariance"]
+    assert sum(len(lines(text, task)) for task in TASKS) == len(TASKS)
 
 
 def test_engines_take_tasks_that_they_can_do():
