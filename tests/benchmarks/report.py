@@ -198,11 +198,11 @@ def summary(rows: list[dict]) -> list[str]:
         f"{against(beaten)}.",
         f"- **More runs stop helping** on {valued(stalled)}: the last rise of N took off less than "
         f"{100 * STALLED:.0f} % of the TV.",
-        f"- **Overconfident**: 90 % intervals hold less than {100 * COVERED:.0f} % of the exact "
-        f"posterior in {valued(narrow)}.",
+        f"- **90 % intervals hold too little**, less than {100 * COVERED:.0f} % of the exact "
+        f"posterior, in {valued(narrow)}.",
         f"- **Take another tool** where your posterior is like that of {valued(high)}, whose TV is "
         f"above {HIGH} at the largest N: PyVBMC if a run tells the likelihood, else sbi's networks "
-        "with thousands of runs, if you can make these.",
+        "with thousands of runs, which are not compared here.",
     ]
 
 
