@@ -82,12 +82,20 @@ COMMAND = re.compile(r"bolfi-liquids guide (\w+)")
 SOUGHT = {  # page of the guide -> heading -> entries of the index, which the search finds first
     f"{GUIDE}/simulator": {
         "## Budget": "! until",
+        "## Parameters": "! hierarchical model",
+        "### A constraint": "! constraint, ! inequality, ! simplex",
+        "## Cheap runs beside expensive ones": "! multi-fidelity, ! multifidelity",
         "## Noise": "! noise",
+        "## Sampling and checks": "! confidence interval, ! credible interval",
+        "### Which of two simulators?": "! model comparison, ! evidence, ! Bayes factor",
         "### Your own discrepancy": "! own discrepancy, ! custom discrepancy, ! custom distance",
     },
     f"{GUIDE}/priors": {"## Ending early": "! until"},
+    f"{GUIDE}/program": {"## The command": "! external program, ! subprocess"},
+    f"{GUIDE}/criticism": {"## In your own simulator": "! add effect"},
 }
 TEMPLATE = "`bolfi-liquids rig template`"
+DEFAULT = re.compile(r"(?<== )_?[A-Z][A-Z_]+\b")  # a number by its name
 STAR = re.compile(r"(?<!\*)\*(?!\*)")  # two are napoleon's
 
 
@@ -105,7 +113,7 @@ def draw_gallery(app):
 
 def adapt(app, docname, source):
     """A guide page's commands that show a page or a template become links, and its headings entries
-    of the index; README is "Overview"."""
+    of the index; README is "Overview"; a package's name may break at its dots."""
     if docname.startswith(GUIDE):
         source[0] = re.sub(f"`{COMMAND.pattern}`", r"[\g<0>](\1.md)", source[0])
         source[0] = source[0].replace(TEMPLATE, f"[{TEMPLATE}](/docs/rig.md)")
@@ -114,6 +122,9 @@ def adapt(app, docname, source):
         source[0] = f"{before}\n```{{index}} {entries}\n```\n\n{heading}\n{after}"
     if docname == "README":
         source[0] = source[0].replace(f"# {project}\n", "# Overview\n", 1)
+    if docname.startswith("docs/api/"):
+        title, rest = source[0].split("\n", 1)
+        source[0] = title.replace(".", ".\u200b") + f"\n{rest}"
 
 
 def skip(app, what, name, obj, skipped, options):
@@ -133,7 +144,7 @@ def describe(app, what, name, obj, options, lines):
         lines[:] = docstring(name.rpartition(".")[2], obj).splitlines()
     package = max((one for one in EXPORTS if f"{name}.".startswith(f"{one}.")), key=len)
     if what == "module":
-        lines += _contents(package)
+        lines[1:] = _contents(package)  # what follows the first line is for developers
     arguments = re.findall(r"^:param (\w+):", "\n".join(lines), re.M)
     lines[:] = [_marked(line, package, arguments) for line in lines]
 
@@ -174,9 +185,14 @@ def _code(text, package):
     return f"``{text}``"
 
 
-def hide_fields(app, what, name, obj, *_):
-    """Of a file's model: the guide has their table."""
-    return ("", None) if what == "class" and issubclass(obj, BaseModel) else None
+def sign(app, what, name, obj, options, *signed):
+    """Without fields of a file's model, of which the guide has the table; constants by value."""
+    if what == "class" and issubclass(obj, BaseModel):
+        return "", None
+    signature, returned = signed
+    constants = vars(sys.modules.get(getattr(obj, "__module__", None), object))
+    spelt = DEFAULT.sub(lambda found: repr(constants.get(found[0], found[0])), signature or "")
+    return (spelt, returned) if signature else None
 
 
 def visit_math(self, node):
@@ -199,5 +215,5 @@ def setup(app):
     app.connect("source-read", adapt)
     app.connect("autodoc-skip-member", skip)
     app.connect("autodoc-process-docstring", describe, priority=600)  # after napoleon
-    app.connect("autodoc-process-signature", hide_fields)
+    app.connect("autodoc-process-signature", sign)
     app.connect("build-finished", finish)

@@ -19,14 +19,14 @@ from queue import SimpleQueue
 import numpy as np
 from engines import ENGINES, OURS, ROOT, command, digest
 from peers.job import Job, reference_path, results
-from report import report
+from report import report, write_page
 from tasks import TASKS, make_reference
 
 
 def main() -> None:
     chosen = arguments()
     if chosen.page:
-        chosen.page.write_text(report(current(chosen)), encoding="utf-8")
+        write_page(current(chosen), chosen.page)
         return
     missing = [name for name in chosen.engines if not ENGINES[name].python.exists()]
     if missing:
@@ -56,7 +56,11 @@ def arguments() -> argparse.Namespace:
     )
     add("--cores", nargs="+", type=int, default=[0], help="processors that work at once")
     add("--out", type=Path, default=ROOT / "runs" / "compare")
-    add("--page", type=Path, help="run nothing; write the report of what there is to this file")
+    add(
+        "--page",
+        type=Path,
+        help="run nothing; write the report of what there is, with figure and scores beside it",
+    )
     chosen = parser.parse_args()
     if chosen.data != "each" and not chosen.data.isdigit():
         parser.error(f"--data must be a seed or `each`, got {chosen.data!r}")

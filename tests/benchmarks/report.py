@@ -1,37 +1,68 @@
 """The report of a comparison in Markdown, as the site's page: medians over seeds, paired tests."""
 
+import re
 from collections.abc import Iterable, Sequence
 from itertools import product
-from typing import NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import pandas as pd
 from machine import machine
 from scipy.stats import wilcoxon
 from tasks import TASKS
 
+from bolfi_liquids.drawing import new_figure, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 OURS = "signal"  # the default surrogate: the one that is compared with each peer
+OWN = (OURS, "discrepancy")
+TOLD = ("vbmc", "vbmc_noisy")  # the likelihood
 LEVEL = 0.05  # of all tests against a peer together
-COLUMNS = {"total_variation": ("TV", 2), "mean_error": ("mean", 2), "sd_ratio": ("sd", 2)} | {
-    "coverage": ("coverage", 2),
-    "engine_s": ("CPU s", 1),
+TIE = 0.01  # differences of TV below it
+STALLED = 0.1  # share of TV that the last rise of N takes off, where it helps; TV that needs none
+HIGH = 0.5  # TV at which a posterior is of little use
+COVERED = 0.8  # of 90 % intervals, at least
+START = re.compile(r"a start design of (\d+) simulations")
+MEASURES = ("total_variation", "mean_error", "sd_ratio", "coverage", "engine_s")
+ABOUT = {  # beside the tasks: what is told of them makes no result stale
+    "gauss2": ("mean of 20 draws of two correlated normals", "ours"),
+    "ma2": ("moving average of order 2, in 100 steps", "ours"),
+    "pend2": ("drags of a driven pendulum with process noise", "ours"),
+    "pendobs": ("drags of a pendulum that is measured with error", "ours"),
+    "pendobs3": ("the same, and its stiffness", "ours"),
+    "two_moons": ("two crescents", "sbibm T.8"),
+    "gaussian_mixture": ("common mean of a wide and a narrow normal", "sbibm T.7"),
+    "sir": ("an epidemic among a million, counted with error", "sbibm T.9"),
+    "lotka_volterra": ("predators and prey", "sbibm T.10"),
+    "slcp": ("mean and covariance of four points; four modes", "sbibm T.3"),
+    "ball_drop": ("drag and gravity of a falling ball", "SEPIA, real data"),
+    "boarding_school": ("an epidemic among 763 pupils", "BMJ 1:587, 1978, real data"),
 }
 TITLE = "# How does the engine compare with ELFI, sbi, PyVBMC and surmise?\n"
-ABOUT = """
-Every engine has the same simulator, prior, data and number N of simulations, a process of its own
-and one processor. `signal` and `discrepancy` are this engine's two surrogates: `signal` is
-`inference.fit` with its default arguments, with `noise=` where a task has noise of a known
-covariance (else `noise=0`: the simulator makes all noise), and with `confirm=0`, for runs that
-confirm come beyond N. `elfi` is ELFI's BOLFI on the logarithm of the task's discrepancy. `npe` and
-`nle` are sbi's, one round on draws of the prior; they see simulations with the noise. `vbmc` is
+PREFACE = """
+`signal` and `discrepancy` are this engine's two surrogates. A score is the total variation (TV)
+between a posterior and the exact one, 0 if equal, 1 if disjoint, median over {seeds} seeds at most.
+A cell is a task at a number N of simulations. Differences below {tie} are ties.
+"""
+RULES = """
+## What is compared
+
+Every engine has the same simulator, prior, data and N, a process of its own and one processor.
+`signal` is `inference.fit` with its default arguments, with `noise=` where a task has noise of a
+known covariance (else `noise=0`: the simulator makes all noise), and with `confirm=0`, for runs
+that confirm come beyond N. `elfi` is ELFI's BOLFI on the logarithm of the task's discrepancy. `npe`
+and `nle` are sbi's, one round on draws of the prior; they see simulations with the noise. `vbmc` is
 PyVBMC with the exact log likelihood, N times, and `vbmc_noisy` the same with a normal error of sd
 1; both only where a run tells the likelihood, for the noise's covariance is known. `surmise` is its
 emulator PCGPwM on a Latin hypercube, with its Bayesian calibrator, where five or more outputs have
 such noise. All peers run with their defaults.
 
-Exact posteriors come from grids, or from importance sampling where no grid resolves them. TV is
-total variation between an engine's density and the exact one, 0 if equal, 1 if disjoint. Seeds are
-those of the engine, and of the data where these are not real (`ball_drop`, `boarding_school`). A
-run that failed has TV 1, and enters no other median.
+Exact posteriors come from grids, or from importance sampling where no grid resolves them. Seeds are
+those of the engine, and of the data where these are not real. A run that failed has TV 1.
+sbibm: Lueckmann et al. 2021, arXiv:2101.04653.
 """
 REPEAT = """
 ## Repeat it
@@ -42,7 +73,8 @@ make peers
 .venv/bin/python tests/benchmarks/compare.py --out runs/compare --page {page}
 ```
 
-An interrupted comparison goes on where it stopped.
+An interrupted comparison goes on where it stopped. [All scores]({scores}), with errors of mean and
+sd, coverage and CPU seconds, are a table.
 """
 PAGE = "bolfi_liquids/guide/benchmark.md"
 
@@ -53,49 +85,75 @@ class Paired(NamedTuple):
     Attributes:
         gain: Median over seeds of the peer's TV less ours.
         p: Of Wilcoxon's signed-rank test over seeds, by Holm's correction for all of the peer's.
+        seeds: Number of pairs.
     """
 
     gain: float
     p: float
+    seeds: int
 
     @property
     def sure(self) -> bool:
         return self.p < LEVEL
 
 
-def report(rows: list[dict]) -> str:
+def write_page(rows: list[dict], page: Path) -> None:
+    """The report, and beside it a table of all scores and the figure that it shows."""
+    page.write_text(report(rows, page.stem), encoding="utf-8")
+    posterior, _ = admitted(rows)
+    scores(posterior).to_csv(page.with_suffix(".csv"), index=False, float_format="%.4g")
+    with styled():
+        draw(posterior).savefig(page.with_suffix(".png"), dpi=100)
+
+
+def report(rows: list[dict], name: str = "benchmark") -> str:
     """Markdown of the rows of results."""
-    made = [row for row in rows if row["kind"] == "posterior"]
-    posterior = [row for row in made if row.get("simulations", 0) <= row["n"]]
+    posterior, too_many = admitted(rows)
     if not posterior:
         return "no results yet"
-    cells = sorted({(r["task"], r["n"]) for r in posterior}, key=order)
-    engines = [e for e in dict.fromkeys(r["engine"] for r in posterior)]
+    cells, engines = cells_of(posterior), engines_of(posterior)
     tests = {e: paired(posterior, e, cells) for e in engines if e != OURS}
+    seeds = len({row["seed"] for row in rows})
+    marked = " \\*: significant by the tests below."
     parts = [
-        TITLE,
-        heading(rows),
-        ABOUT,
+        TITLE + PREFACE.format(seeds=seeds, tie=TIE),
+        *summary(posterior),
+        f"\n![Median TV against N, a panel for each task and a line for each engine]({name}.png)",
+        "\n## Tasks\n",
+        *task_table(cells),
+        RULES,
         "## Total variation\n",
-        f"Medians over seeds. In bold: smaller than `{OURS}`'s. \\*: the difference over seeds is "
-        f"significant at {LEVEL}.\n",
+        f"In bold: below `{OURS}`'s, ties apart.{marked * testable(tests)}\n",
         *variation_table(posterior, engines, cells, tests),
         "\n## Against each peer\n",
-        "Cells are a task at an N, on the seeds that both have. Wilcoxon's signed-rank test of TV, "
-        "corrected by Holm for all cells of a peer. With fewer than ten seeds hardly any "
-        "difference can be significant.\n",
-        *summary_table(tests),
-        "\n## All scores\n",
-        "mean: error of the mean in exact sds, root mean square over parameters. sd: over the "
-        "exact one, geometric mean over parameters. coverage: exact probability of the 90 % "
-        "intervals, mean over parameters. CPU s: of the engine, without simulator. Medians.\n",
-        *scores_table(posterior, engines, cells),
+        *peer_table(tests),
+        "",
+        *left_out(too_many),
         *failures(posterior),
-        *left_out(row for row in made if row not in posterior),
         *timings(rows),
-        REPEAT.format(page=PAGE),
+        REPEAT.format(page=PAGE, scores=f"{name}.csv"),
+        versions(rows),
     ]
     return "\n".join(parts)
+
+
+def admitted(rows: list[dict]) -> tuple[list[dict], list[dict]]:
+    """Posteriors of N simulations, and those of engines that need more."""
+    made = [row for row in rows if row["kind"] == "posterior"]
+    return [r for r in made if needed(r) <= r["n"]], [r for r in made if needed(r) > r["n"]]
+
+
+def needed(row: dict) -> int:
+    design = START.search(row.get("error", ""))
+    return int(design[1]) if design else row.get("simulations", 0)
+
+
+def cells_of(rows: list[dict]) -> list[tuple[str, int]]:
+    return sorted({(r["task"], r["n"]) for r in rows}, key=order)
+
+
+def engines_of(rows: list[dict]) -> list[str]:
+    return list(dict.fromkeys(r["engine"] for r in rows))
 
 
 def order(cell: tuple[str, int]) -> tuple[int, int]:
@@ -104,6 +162,117 @@ def order(cell: tuple[str, int]) -> tuple[int, int]:
 
 def of(rows: list[dict], engine: str, cell: tuple[str, int]) -> list[dict]:
     return [r for r in rows if r["engine"] == engine and (r["task"], r["n"]) == cell]
+
+
+def summary(rows: list[dict]) -> list[str]:
+    """What the cells show of `OURS`: where it is best, loses, stops, covers too little."""
+    engines, cells = engines_of(rows), cells_of(rows)
+    found = {(e, c): median(of(rows, e, c), "total_variation") for e in engines for c in cells}
+    scored = {key: value for key, value in found.items() if not np.isnan(value)}
+    ours = {cell: value for (e, cell), value in scored.items() if e == OURS}
+    blind = {key: value for key, value in scored.items() if key[0] not in TOLD}
+    met = {cell for e, cell in blind if e not in OWN} & ours.keys()
+    told = {cell for e, cell in scored if e in TOLD} & ours.keys()
+    lost = losses(blind, met)
+    beaten = losses({k: value for k, value in scored.items() if k[0] in (OURS, *TOLD)}, told)
+    runs = {task: [ours[c] for c in cells if c[0] == task and c in ours] for task, _ in cells}
+    stalled = {
+        task: values[-1]
+        for task, values in runs.items()
+        if values[1:] and values[-1] > max(STALLED, (1.0 - STALLED) * values[-2])
+    }
+    high = {task: values[-1] for task, values in runs.items() if values and values[-1] > HIGH}
+    coverage = {at(cell): median(of(rows, OURS, cell), "coverage") for cell in ours}
+    narrow = {cell: value for cell, value in coverage.items() if value < COVERED}
+
+    def against(cells: dict) -> str:
+        return listed(
+            f"{at(c)} to `{e}` ({ours[c]:.2f}; {scored[e, c]:.2f})" for c, e in cells.items()
+        )
+
+    return [
+        f"- **Lowest TV**, among engines that are not told the likelihood: in "
+        f"{len(met) - len(lost)} of {len(met)} cells that a peer shares. `{OURS}` loses (its TV; "
+        f"the other's): {against(lost)}.",
+        f"- **PyVBMC is told the likelihood** and wins {len(beaten)} of {len(told)} cells: "
+        f"{against(beaten)}.",
+        f"- **More runs stop helping** on {valued(stalled)}: the last rise of N took off less than "
+        f"{100 * STALLED:.0f} % of the TV.",
+        f"- **90 % intervals hold too little**, less than {100 * COVERED:.0f} % of the exact "
+        f"posterior, in {valued(narrow)}.",
+        f"- **Take another tool** where your posterior is like that of {valued(high)}, whose TV is "
+        f"above {HIGH} at the largest N: PyVBMC if a run tells the likelihood, else sbi's networks "
+        "with thousands of runs, which are not compared here.",
+    ]
+
+
+def valued(values: dict) -> str:
+    return listed(f"{name} ({value:.2f})" for name, value in values.items())
+
+
+def losses(scored: dict, cells: Iterable[tuple[str, int]]) -> dict:
+    """Cell -> the best engine, where `OURS` is farther than `TIE` behind it."""
+    best = {
+        cell: min((e for e, c in scored if c == cell), key=lambda e: scored[e, cell])
+        for cell in sorted(cells, key=order)
+    }
+    return {c: e for c, e in best.items() if scored[OURS, c] - scored[e, c] > TIE}
+
+
+def at(cell: tuple[str, int]) -> str:
+    return f"{cell[0]} at N = {cell[1]}"
+
+
+def listed(parts: Iterable[str]) -> str:
+    return ", ".join(parts) or "none"
+
+
+def task_table(cells: Sequence[tuple[str, int]]) -> list[str]:
+    """Of the tasks of these cells; outputs are those that `OURS` is given."""
+    body = []
+    for name in dict.fromkeys(task for task, _ in cells):
+        task, (what, source) = TASKS[name], ABOUT[name]
+        outputs = task.view(task.observe(0)[None]).size
+        noise = "simulator" if task.noise is None else "data, known covariance"
+        body.append([name, what, str(len(task.names)), str(outputs), noise, source])
+    return table(["task", "what", "d", "m", "noise of", "source"], body) + [
+        "\nd parameters, m outputs."
+    ]
+
+
+def scores(rows: list[dict]) -> pd.DataFrame:
+    """Medians over seeds of all measures, a row for each cell and engine."""
+    found = []
+    for cell, engine in product(cells_of(rows), engines_of(rows)):
+        if own := of(rows, engine, cell):
+            seeds = len({row["seed"] for row in own})
+            found.append([*cell, engine, seeds, *(median(own, name) for name in MEASURES)])
+    return pd.DataFrame(found, columns=["task", "n", "engine", "seeds", *MEASURES])
+
+
+def draw(rows: list[dict]) -> "Figure":
+    """Median TV against N: a panel for each task, a line for each engine."""
+    medians = scores(rows)
+    tasks, numbers = medians["task"].unique(), sorted(medians["n"].unique())
+    height = -(-len(tasks) // 3)
+    figure = new_figure(8.0, 1.8 * height + 0.5)
+    panels = figure.subplots(height, 3, sharex=True, sharey=True, squeeze=False)
+    for panel in panels.flat[len(tasks) :]:
+        panel.set_axis_off()
+    for panel, task in zip(panels.flat, tasks, strict=False):
+        panel.set_title(task)
+        for i, engine in enumerate(engines_of(rows)):
+            own = medians[(medians["task"] == task) & (medians["engine"] == engine)]
+            width = 2.5 if engine == OURS else 1.0
+            panel.plot(own["n"], own["total_variation"], f"C{i}.-", lw=width, label=engine)
+    first = panels[0, 0]  # whose axes all share
+    first.set(xscale="log", ylim=(-0.02, 1.02))
+    first.set_xticks(numbers, map(str, numbers))
+    first.minorticks_off()
+    figure.supxlabel("N")
+    figure.supylabel("total variation from the exact posterior")
+    figure.legend(*first.get_legend_handles_labels(), loc="outside upper center", ncols=8)
+    return figure
 
 
 def paired(rows: list[dict], peer: str, cells: Sequence[tuple[str, int]]) -> dict:
@@ -117,7 +286,7 @@ def paired(rows: list[dict], peer: str, cells: Sequence[tuple[str, int]]) -> dic
         gains = np.array([theirs[seed] - ours[seed] for seed in ours.keys() & theirs.keys()])
         if len(gains):
             p = wilcoxon(gains)[1] if gains.any() else 1.0
-            found[cell] = Paired(float(np.median(gains)), float(p))
+            found[cell] = Paired(float(np.median(gains)), float(p), len(gains))
     corrected = holm([one.p for one in found.values()])
     return {c: one._replace(p=p) for (c, one), p in zip(found.items(), corrected, strict=True)}
 
@@ -136,6 +305,12 @@ def table(head: Sequence[str], body: Sequence[Sequence[str]]) -> list[str]:
     return [f"| {' | '.join(row)} |" for row in (head, rule, *body)]
 
 
+def testable(tests: dict[str, dict]) -> bool:
+    """Whether the least p that some peer's pairs can give is significant."""
+    seeds = {peer: max((one.seeds for one in of.values()), default=0) for peer, of in tests.items()}
+    return any(len(tests[peer]) * 2.0 ** (1 - n) < LEVEL for peer, n in seeds.items())
+
+
 def variation_table(rows, engines, cells, tests) -> list[str]:
     body = []
     for cell in cells:
@@ -145,58 +320,67 @@ def variation_table(rows, engines, cells, tests) -> list[str]:
             value = median(of(rows, engine, cell), "total_variation")
             test = tests.get(engine, {}).get(cell)
             text = shown(value, 2) + ("\\*" if test is not None and test.sure else "")
-            shown_cells.append(f"**{text}**" if value < own else text)
-        body.append([cell[0], str(cell[1]), *shown_cells])
-    return table(["task", "N", *engines], body)
+            shown_cells.append(f"**{text}**" if value < own - TIE else text)
+        body.append([f"{cell[0]} {cell[1]}", *shown_cells])
+    return table(["task, N", *engines], body)
 
 
-def summary_table(tests: dict[str, dict]) -> list[str]:
-    body = []
-    for peer, cells in tests.items():
-        counts = [
-            str(sum(sign * one.gain > 0.0 and (one.sure or not sure) for one in cells.values()))
-            for sign, sure in product((1, -1), (False, True))
-        ]
-        body.append([peer, str(len(cells)), *counts])
-    return table(["peer", "cells", "we win", "significantly", "we lose", "significantly"], body)
+def peer_table(tests: dict[str, dict]) -> list[str]:
+    """How often `OURS` is closer than each peer, and than our other surrogate below the table."""
+    sure = testable(tests)
+    counts = {engine: compared(list(cells.values()), sure) for engine, cells in tests.items()}
+    head = ["peer", "cells", "closer", "tied", "farther"]
+    note = f"How often `{OURS}` is closer to the exact posterior, on the seeds that both have."
+    if sure:
+        head += ["surely closer", "surely farther"]
+        note += f" Surely: by Wilcoxon's signed-rank test at {LEVEL}, with Holm's correction."
+    lines = [f"{note}\n", *table(head, [[e, *map(str, counts[e])] for e in counts if e not in OWN])]
+    for other in (e for e in counts if e in OWN):
+        total, closer, tied, farther = counts[other][:4]
+        lines.append(
+            f"\nThan our own `{other}`, `{OURS}` is closer in {closer} of {total} cells, tied in "
+            f"{tied} and farther in {farther}."
+        )
+    return lines
 
 
-def scores_table(rows, engines, cells) -> list[str]:
-    body = []
-    for cell, engine in product(cells, engines):
-        if own := of(rows, engine, cell):
-            values = [shown(median(own, key), digits) for key, (_, digits) in COLUMNS.items()]
-            seeds = str(len({row["seed"] for row in own}))
-            body.append([cell[0], str(cell[1]), engine, seeds, *values])
-    return table(["task", "N", "engine", "seeds", *(name for name, _ in COLUMNS.values())], body)
+def compared(cells: list[Paired], sure: bool) -> list[int]:
+    """Numbers of cells: all, closer, tied, farther, and `sure` ones that are closer, farther."""
+    signs = [int(np.sign(one.gain)) * (abs(one.gain) >= TIE) for one in cells]
+    found = [len(cells), *(signs.count(sign) for sign in (1, 0, -1))]
+    gains = [one.gain for one in cells if one.sure]
+    return found + ([sum(g > 0 for g in gains), sum(g < 0 for g in gains)] if sure else [])
 
 
 def failures(rows: list[dict]) -> list[str]:
     """What has no posterior, or stopped in NUTS."""
     what = {"error": "has no posterior", "nuts_error": "stopped in NUTS"}
-    seeds: dict[tuple, list[str]] = {}
+    cases: dict[tuple, dict] = {}  # of dictionaries in the place of ordered sets
     for name, row in product(what, rows):
         if name in row:
-            case = row["engine"], what[name], row["task"], row["n"], row[name]
-            seeds.setdefault(case, []).append(str(row["seed"]))
-    return ["\n## Failures\n"] + [
-        f"- `{engine}` {text} on {task} at N = {n}, seeds {', '.join(found)}: {reason}"
-        for (engine, text, task, n, reason), found in seeds.items()
+            case = row["engine"], what[name], row["task"], row[name]
+            cases.setdefault(case, {})[f"N = {row['n']}, seed {row['seed']}"] = None
+    return [
+        f"- `{engine}` {text} on {task} at {'; '.join(found)}: {reason}"
+        for (engine, text, task, reason), found in cases.items()
     ]
 
 
 def left_out(rows: Iterable[dict]) -> list[str]:
-    """What made more simulations than it was to."""
-    counts = {(r["engine"], r["task"], r["n"]): r["simulations"] for r in rows}
+    """Engines that cannot start, or end, with N simulations."""
+    cases: dict[tuple, dict] = {}
+    for row in sorted(rows, key=lambda row: row["n"]):
+        cases.setdefault((row["engine"], row["task"], needed(row)), {})[str(row["n"])] = None
     return [
-        f"- `{engine}` is left out on {task} at N = {n}: it made {made} simulations"
-        for (engine, task, n), made in counts.items()
+        f"- `{engine}` is left out on {task} at N = {', '.join(budgets)}: it needs {simulations} "
+        "simulations"
+        for (engine, task, simulations), budgets in cases.items()
     ]
 
 
 def timings(rows: list[dict]) -> list[str]:
     """Imports, single steps, compilations, cold runs and NUTS, where they were timed."""
-    lines = ["\n## Seconds beside those of the table\n"]
+    lines = ["\n## Seconds\n"]
     for engine in dict.fromkeys(row["engine"] for row in rows):
         own = [row for row in rows if row["engine"] == engine]
         text = f"- `{engine}`: imports {shown(median(own, 'import_s'), 1)} s"
@@ -227,6 +411,6 @@ def shown(value: float, digits: int) -> str:
     return "" if np.isnan(value) else f"{value:.{digits}f}"
 
 
-def heading(rows: list[dict]) -> str:
-    versions = ", ".join(dict.fromkeys(f"{row['engine']}: {row['version']}" for row in rows))
-    return f"{machine()}. {versions}. {len({row['seed'] for row in rows})} seeds at most.\n"
+def versions(rows: list[dict]) -> str:
+    found = {row["engine"]: row["version"] for row in rows}
+    return f"{machine()}. {', '.join(f'{e}: {version}' for e, version in found.items())}.\n"

@@ -112,10 +112,17 @@ def test_program(tmp_path, monkeypatch):
 
 
 def test_parameters_that_depend_on_one_another(tmp_path, monkeypatch):
-    prior = run(section("simulator", "Parameters"), tmp_path, monkeypatch)["prior"]
+    made = run(section("simulator", "Parameters"), tmp_path, monkeypatch)
+    prior = made["prior"]
     assert prior.names == ("slow", "fast", "mean", "a", "b", "c")
     theta = prior.from_unit(np.random.default_rng(0).random((100, 6)))
     assert (theta["slow"] < theta["fast"]).all()
+    grid = (np.stack(np.meshgrid(*[np.arange(40)] * 2), -1).reshape(-1, 2) + 0.5) / 40
+    shares = made["shares"].from_unit(grid)
+    a, b = shares["a"], shares["b"]
+    assert (a + b < 1).all()
+    found = [a.mean(), b.mean(), a.var(), np.cov(a, b)[0, 1]]
+    assert np.allclose(found, [1 / 3, 1 / 3, 1 / 18, -1 / 36], atol=2e-3)  # of a uniform triangle
 
 
 @pytest.mark.slow
