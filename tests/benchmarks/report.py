@@ -1,15 +1,15 @@
 """The report of a comparison in Markdown, as the site's page: medians over seeds, paired tests."""
 
-import re
 from collections.abc import Iterable, Sequence
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import pandas as pd
+from cells import admitted, cells_of, engines_of, median, needed, of, scores
 from machine import machine
 from scipy.stats import wilcoxon
+from summary import OURS, OWN, TIE, summary
 from tasks import TASKS
 
 from bolfi_liquids.drawing import new_figure, styled
@@ -17,16 +17,7 @@ from bolfi_liquids.drawing import new_figure, styled
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-OURS = "signal"  # the default surrogate: the one that is compared with each peer
-OWN = (OURS, "discrepancy")
-TOLD = ("vbmc", "vbmc_noisy")  # the likelihood
 LEVEL = 0.05  # of all tests against a peer together
-TIE = 0.01  # differences of TV below it
-STALLED = 0.1  # share of TV that the last rise of N takes off, where it helps; TV that needs none
-HIGH = 0.5  # TV at which a posterior is of little use
-COVERED = 0.8  # of 90 % intervals, at least
-START = re.compile(r"a start design of (\d+) simulations")
-MEASURES = ("total_variation", "mean_error", "sd_ratio", "coverage", "engine_s")
 ABOUT = {  # beside the tasks: what is told of them makes no result stale
     "gauss2": ("mean of 20 draws of two correlated normals", "ours"),
     "ma2": ("moving average of order 2, in 100 steps", "ours"),
@@ -137,96 +128,6 @@ def report(rows: list[dict], name: str = "benchmark") -> str:
     return "\n".join(parts)
 
 
-def admitted(rows: list[dict]) -> tuple[list[dict], list[dict]]:
-    """Posteriors of N simulations, and those of engines that need more."""
-    made = [row for row in rows if row["kind"] == "posterior"]
-    return [r for r in made if needed(r) <= r["n"]], [r for r in made if needed(r) > r["n"]]
-
-
-def needed(row: dict) -> int:
-    design = START.search(row.get("error", ""))
-    return int(design[1]) if design else row.get("simulations", 0)
-
-
-def cells_of(rows: list[dict]) -> list[tuple[str, int]]:
-    return sorted({(r["task"], r["n"]) for r in rows}, key=order)
-
-
-def engines_of(rows: list[dict]) -> list[str]:
-    return list(dict.fromkeys(r["engine"] for r in rows))
-
-
-def order(cell: tuple[str, int]) -> tuple[int, int]:
-    return list(TASKS).index(cell[0]), cell[1]
-
-
-def of(rows: list[dict], engine: str, cell: tuple[str, int]) -> list[dict]:
-    return [r for r in rows if r["engine"] == engine and (r["task"], r["n"]) == cell]
-
-
-def summary(rows: list[dict]) -> list[str]:
-    """What the cells show of `OURS`: where it is best, loses, stops, covers too little."""
-    engines, cells = engines_of(rows), cells_of(rows)
-    found = {(e, c): median(of(rows, e, c), "total_variation") for e in engines for c in cells}
-    scored = {key: value for key, value in found.items() if not np.isnan(value)}
-    ours = {cell: value for (e, cell), value in scored.items() if e == OURS}
-    blind = {key: value for key, value in scored.items() if key[0] not in TOLD}
-    met = {cell for e, cell in blind if e not in OWN} & ours.keys()
-    told = {cell for e, cell in scored if e in TOLD} & ours.keys()
-    lost = losses(blind, met)
-    beaten = losses({k: value for k, value in scored.items() if k[0] in (OURS, *TOLD)}, told)
-    runs = {task: [ours[c] for c in cells if c[0] == task and c in ours] for task, _ in cells}
-    stalled = {
-        task: values[-1]
-        for task, values in runs.items()
-        if values[1:] and values[-1] > max(STALLED, (1.0 - STALLED) * values[-2])
-    }
-    high = {task: values[-1] for task, values in runs.items() if values and values[-1] > HIGH}
-    coverage = {at(cell): median(of(rows, OURS, cell), "coverage") for cell in ours}
-    narrow = {cell: value for cell, value in coverage.items() if value < COVERED}
-
-    def against(cells: dict) -> str:
-        return listed(
-            f"{at(c)} to `{e}` ({ours[c]:.2f}; {scored[e, c]:.2f})" for c, e in cells.items()
-        )
-
-    return [
-        f"- **Lowest TV**, among engines that are not told the likelihood: in "
-        f"{len(met) - len(lost)} of {len(met)} cells that a peer shares. `{OURS}` loses (its TV; "
-        f"the other's): {against(lost)}.",
-        f"- **PyVBMC is told the likelihood** and wins {len(beaten)} of {len(told)} cells: "
-        f"{against(beaten)}.",
-        f"- **More runs stop helping** on {valued(stalled)}: the last rise of N took off less than "
-        f"{100 * STALLED:.0f} % of the TV.",
-        f"- **90 % intervals hold too little**, less than {100 * COVERED:.0f} % of the exact "
-        f"posterior, in {valued(narrow)}.",
-        f"- **Take another tool** where your posterior is like that of {valued(high)}, whose TV is "
-        f"above {HIGH} at the largest N: PyVBMC if a run tells the likelihood, else sbi's networks "
-        "with thousands of runs, which are not compared here.",
-    ]
-
-
-def valued(values: dict) -> str:
-    return listed(f"{name} ({value:.2f})" for name, value in values.items())
-
-
-def losses(scored: dict, cells: Iterable[tuple[str, int]]) -> dict:
-    """Cell -> the best engine, where `OURS` is farther than `TIE` behind it."""
-    best = {
-        cell: min((e for e, c in scored if c == cell), key=lambda e: scored[e, cell])
-        for cell in sorted(cells, key=order)
-    }
-    return {c: e for c, e in best.items() if scored[OURS, c] - scored[e, c] > TIE}
-
-
-def at(cell: tuple[str, int]) -> str:
-    return f"{cell[0]} at N = {cell[1]}"
-
-
-def listed(parts: Iterable[str]) -> str:
-    return ", ".join(parts) or "none"
-
-
 def task_table(cells: Sequence[tuple[str, int]]) -> list[str]:
     """Of the tasks of these cells; outputs are those that `OURS` is given."""
     body = []
@@ -238,16 +139,6 @@ def task_table(cells: Sequence[tuple[str, int]]) -> list[str]:
     return table(["task", "what", "d", "m", "noise of", "source"], body) + [
         "\nd parameters, m outputs."
     ]
-
-
-def scores(rows: list[dict]) -> pd.DataFrame:
-    """Medians over seeds of all measures, a row for each cell and engine."""
-    found = []
-    for cell, engine in product(cells_of(rows), engines_of(rows)):
-        if own := of(rows, engine, cell):
-            seeds = len({row["seed"] for row in own})
-            found.append([*cell, engine, seeds, *(median(own, name) for name in MEASURES)])
-    return pd.DataFrame(found, columns=["task", "n", "engine", "seeds", *MEASURES])
 
 
 def draw(rows: list[dict]) -> "Figure":
@@ -397,14 +288,6 @@ def timings(rows: list[dict]) -> list[str]:
             text += f"; at N = {n} {', '.join(said)}" if said else ""
         lines.append(text)
     return lines
-
-
-def median(rows: list[dict], name: str) -> float:
-    """Of those that have it; NaN where none does. A run without posterior has TV 1."""
-    worst = {"total_variation": 1.0}.get(name)
-    values = [row.get(name, worst) if "error" in row else row.get(name) for row in rows]
-    values = [value for value in values if value is not None]
-    return float(np.median(values)) if values else float("nan")
 
 
 def shown(value: float, digits: int) -> str:
