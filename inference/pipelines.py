@@ -14,6 +14,7 @@ from ._lazy import xr
 from .arguments import (
     check_flag,
     check_function,
+    check_identity,
     check_progress,
     check_text,
     checked_integer,
@@ -87,6 +88,8 @@ class FitPipeline:
         called = {name: options.pop(name) for name in CALLING if name in options}
         simulator = for_engine(self.simulate, **called)
         check_names(simulator, self.prior.names)
+        named = options.get("identity") or simulator.identity
+        check_identity(named, "bank", options.get("bank"))
         object.__setattr__(self, "simulate", simulator)
         object.__setattr__(self, "options", options)
 

@@ -257,8 +257,8 @@ class DiscrepancyFamily(Family):
             leave-one-out log predictive density.
         threshold: Rule for eps; None makes the posterior as wide as the closest run's residual
             suggests, were the discrepancy a sum of squares, see `threshold.matched`, or guesses of
-            fewer than 3 numbers more than parameters; or a number on the discrepancy's own scale, which may be
-            negative where a user's discrepancy is, as a logarithm; see
+            fewer than 3 numbers more than parameters; or a number on the discrepancy's own scale,
+            which may be negative where a user's discrepancy is, as a logarithm; see
             `threshold.choose_threshold`.
     """
 

@@ -427,6 +427,8 @@ def test_what_keeps_results_needs_the_simulators_name(cases, tmp_path):
             with pytest.raises(ValueError, match=told):
                 call(**good, bank=kept)
     with pytest.raises(ValueError, match=told):
+        inference.FitPipeline(len, good["prior"], options={"bank": tmp_path / "b.sqlite"})
+    with pytest.raises(ValueError, match=told):
         inference.replicates(print, len, good["prior"], 2, store=tmp_path / "b.sqlite")
     data = criticism.Experiment(len, OBSERVED, criticism.KnownNoise(1.0), "named")
     with pytest.raises(ValueError, match=told):
