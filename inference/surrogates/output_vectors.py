@@ -11,6 +11,7 @@ from .measurement_noise import Layout
 
 MIN_SERIES = 5  # samples from which an output counts as a series, whose values share a scale
 MIN_LONG = 16  # samples of a series from which their residual tells the size of the noise
+LEAST_UNIT = 1e-100  # smaller numbers have no square
 MAX_VALUES = 2000  # values; neighbouring samples of longer series are averaged
 
 Summary = Callable[[np.ndarray], np.ndarray]
@@ -92,8 +93,9 @@ class Output:
             channel = self.layout.channel
             mean = np.bincount(channel, variance) / np.bincount(channel)
             variance = mean[channel]
-        # a simulator that returns a constant has no other unit than that
-        unit = 1.0 if variance.any() else np.abs(values).max() or 1.0
+        # a constant simulator has no other unit than its output, if that has a square
+        size = np.abs(values).max()
+        unit = size if size > LEAST_UNIT and not variance.any() else 1.0
         return np.where(variance > 0, np.sqrt(variance), unit)
 
 
