@@ -214,6 +214,14 @@ def check_text(name: str, value: object) -> None:
     require(isinstance(value, str), name, "be text", value)
 
 
+def check_identity(identity: str, keeper: str, kept: object) -> None:
+    """Raise ValueError for an empty `identity` where the argument `keeper` keeps results: another
+    simulator's would be taken for its own."""
+    due = f"name the simulator and its version where {keeper}= keeps what it returns"
+    cure = 'give such as identity="decay 1.2", another with anything that changes the signals'
+    require(identity or kept in (None, ":memory:"), "identity", due, identity, cure=cure)
+
+
 def check_function(name: str, value: object) -> None:
     """Raise ValueError unless `value` is a function."""
     require(callable(value), name, "be a function", value)

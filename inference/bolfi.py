@@ -25,7 +25,7 @@ from .simulations.failures import Failure, FailureKind, not_finite
 from .simulations.job import BATCH
 from .sobol import sobol, start_size
 from .surrogates.base import Acquisition, Family
-from .surrogates.families import checked_surrogate, resolve
+from .surrogates.families import check_options, checked_surrogate, resolve
 from .surrogates.warnings import complain
 from .types import Theta
 
@@ -91,6 +91,7 @@ class Bolfi(Displayed):
         **options: Any,
     ):
         checked_prior(prior)
+        check_options(options, Bolfi)
         self.prior = prior
         self.family = resolve(surrogate, options)
         self.observed = self.family.observe(observed)
@@ -237,7 +238,8 @@ class Bolfi(Displayed):
             signals: [n, *signal_shape], or a list of n signals; these may be of any shapes where
                 a discrepancy or summary of the user's own compares them.
             seeds: Seeds of the runs [n], to be kept with the results. Of runs with equal theta,
-                seed and signal one is learned from.
+                seed and signal one is learned from; without seeds, what was not asked for and
+                equals a run before, in theta and signal, is a copy of it.
             errors: Why a run failed [n], to be kept for rows of NaN; "" or None elsewhere. A text
                 counts as raised; `Fit.history.why` keeps the kinds.
 
@@ -280,6 +282,8 @@ class Bolfi(Displayed):
         rows = self.prior.to_dict(theta)
         measured = self.family.measure(self._view, outputs)
         good = np.isfinite(measured.discrepancy)
+        gaps = int(np.isnan(self.observed).sum())
+        missing = f"; observed holds {gaps} NaN: let discrepancy leave them out" if gaps else ""
         why = np.full(len(theta), None)
         known = zip(faults, measured.errors, told_errors(errors, good), strict=True)
         for i, (fault, compared, told) in enumerate(known):
@@ -290,7 +294,7 @@ class Bolfi(Displayed):
             if not good[i]:
                 output = outputs[i]
                 finite = output is not None and np.isfinite(output).all()
-                blank = not_finite("the discrepancy" if finite else "the signal")
+                blank = not_finite(f"the discrepancy{missing}" if finite else "the signal")
                 why[i] = fault or compared or told or blank
         return History(
             theta=theta,

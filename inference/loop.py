@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from . import checks, criticism
 from .arguments import (
+    check_called,
     check_flag,
     check_function,
     check_progress,
@@ -31,6 +32,7 @@ from .simulations.program import check_names
 from .simulations.runner import Runner
 from .sobol import start_size
 from .surrogates.base import Acquisition, Family
+from .surrogates.families import check_options
 from .surrogates.warnings import complain
 from .types import Simulator, SingleSimulator
 from .until import Until, check_reaches, checked_budget, enough
@@ -82,7 +84,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
             A run that raises, takes too long, returns NaN or something else than a signal costs
             that run only, see `Fit.failures`; a masked value is NaN.
         prior: The parameters and their priors.
-        observed: The measured signal [*signal_shape], time first; NaN is a missing sample. None,
+        observed: The measured signal [*signal_shape], time first, also where a `summary` is taken;
+            NaN is a missing sample. None,
             and only so, with surrogate="log_likelihood": `simulate` then returns log likelihoods
             [b], or [b, 2] with the sd of their noise; -inf where the data are impossible.
         budget: Simulations in all, failed ones and those found in the bank included; at most 8192,
@@ -99,9 +102,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
         bank: A path, or a bank that other runs share; it is left open then. Every simulation
             is stored when its call is finished, and what another run is simulating for the same
             bank at the same time is waited for.
-        identity: Names the simulator and its settings in the bank. Anything that changes
-            the signals for equal theta and seed must change it. A `Program`'s is its command and
-            the names of its functions, unless one is given; not the program's version.
+        identity: Names the simulator and its settings in the bank, which needs it. Anything that
+            changes the signals for equal theta and seed must change it. A `Program`'s is its
+            command and the names of its functions, unless one is given; not the program's version.
         timeout: Seconds that one simulation may take; those of one call together as many times
             as long, and if it fails they are tried one by one. `simulate` then runs in a
             thread, which is abandoned, not stopped, when it is overdue: see `job.within`.
@@ -164,10 +167,12 @@ def fit(  # noqa: PLR0913  the one call that most users make
     confirm = 0 if simulate is None else confirm
     check_progress(progress)
     check_text("identity", identity)
+    check_options(options, fit)
     for name, flag in {"vectorised": vectorised, "in_rounds": in_rounds, "warn": warn}.items():
         check_flag(name, flag)
     if budget or simulate is not None:
         check_function("simulate", simulate)
+        check_called("simulate", simulate, "theta", "seeds" if vectorised else "seed")
     simulator = for_engine(simulate, vectorised, together, time_limit)
     identity = identity or simulator.identity
     check_runs("earlier", earlier, 2, 3, 4)
@@ -193,7 +198,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         engine.tell(*earlier)
     check_reaches(engine, budget, until, batch if in_rounds else 1)
     with ExitStack() as stack:
-        compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
+        compute = stack.enter_context(open_compute(executor, timeout, batch, bank, identity))
         bound = "at most" if until else "at least" if confirm else ""
         bar = progress_bar("simulations", budget + confirm, shown=progress, bound=bound)
         advance = stack.enter_context(bar)
@@ -253,7 +258,7 @@ def _in_rounds(
         # whole rounds are asked even if the budget ends before, so that a larger one goes on
         # from the same points
         asked = jobs(engine.ask(batch), [simulation_seed(engine.seed, i) for i in indices])
-        yield from _tell(engine, asked, runner.run(asked))
+        yield from _tell(engine, runner, asked, runner.run(asked))
 
 
 def _in_flight(
@@ -264,7 +269,7 @@ def _in_flight(
 
     def land() -> list[Simulation]:
         job, outcome = flying.popleft()
-        return _tell(engine, [job], [runner.result(outcome)])
+        return _tell(engine, runner, [job], [runner.result(outcome)])
 
     for index in range(budget):
         if stop():
@@ -290,10 +295,12 @@ def _confirmation(engine: Bolfi, made: Fit, runner: Runner, n: int) -> list[Simu
     first = max(engine.asked, engine.told)  # earlier runs may be of the same seed
     seeds = [simulation_seed(engine.seed, first + i) for i in range(n)]
     asked = jobs(engine.confirm(made, n), seeds)
-    return _tell(engine, asked, runner.run(asked))
+    return _tell(engine, runner, asked, runner.run(asked))
 
 
-def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Simulation]:
+def _tell(
+    engine: Bolfi, runner: Runner, asked: list[Job], results: list[Simulation]
+) -> list[Simulation]:
     """Tell the engine; returns the results.
 
     Raises:
@@ -307,5 +314,6 @@ def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Si
     if engine.told >= engine.initial and engine.succeeded == 0:
         raise RuntimeError(
             f"all {engine.told} simulations of the start design failed{engine.history.last_error}"
+            f"{runner.how_called(engine.history.errors)}"
         )
     return results

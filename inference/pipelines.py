@@ -14,6 +14,7 @@ from ._lazy import xr
 from .arguments import (
     check_flag,
     check_function,
+    check_identity,
     check_progress,
     check_text,
     checked_integer,
@@ -31,7 +32,7 @@ from .simulations.job import BATCH, for_engine, jobs, simulation_seed, stacked
 from .simulations.program import check_names
 from .simulations.runner import run_missing
 from .sobol import sobol
-from .surrogates.families import resolve
+from .surrogates.families import check_options, resolve
 from .types import Simulator, SingleSimulator
 
 Options = Mapping[str, Any]
@@ -44,6 +45,7 @@ def _check_options(options: Options, known: Iterable[str]) -> None:
     """Raise ValueError for options of `fit` that are neither `known` nor their surrogate's."""
     names = signature(fit).parameters
     of_family = {name: value for name, value in options.items() if name not in names}
+    check_options(of_family, fit)
     resolve(options.get("surrogate"), of_family)
     allowed = {*known, *of_family} - OF_PIPELINE - {"options"}
     if wrong := set(options) - allowed:
@@ -86,6 +88,8 @@ class FitPipeline:
         called = {name: options.pop(name) for name in CALLING if name in options}
         simulator = for_engine(self.simulate, **called)
         check_names(simulator, self.prior.names)
+        named = options.get("identity") or simulator.identity
+        check_identity(named, "bank", options.get("bank"))
         object.__setattr__(self, "simulate", simulator)
         object.__setattr__(self, "options", options)
 
@@ -137,12 +141,14 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
     seed = checked_integer("seed", seed, 0)
     check_progress(progress)
     check_text("identity", identity)
+    simulator = for_engine(pipeline.simulate)
+    identity = identity or simulator.identity
     theta = prior.from_unit(sobol(seed, 0, n, len(prior)))
     seeds = [simulation_seed(seed, i) for i in range(n)]
     with ExitStack() as stack:
-        compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
+        compute = stack.enter_context(open_compute(executor, timeout, batch, bank, identity))
         advance = stack.enter_context(progress_bar("simulations", n, shown=progress))
-        simulator, asked = for_engine(pipeline.simulate), jobs(theta, seeds)
+        asked = jobs(theta, seeds)
         made = run_missing(simulator, asked, compute, identity=identity, advance=advance)
     good = sum(result.signal is not None for result in made)
     if good < MIN_LEARN:

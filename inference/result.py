@@ -41,6 +41,7 @@ from .surrogates.warnings import (
     DOUBTED,
     censored_warnings,
     history_warnings,
+    shape_warnings,
     unconfirmed_warnings,
 )
 from .types import Simulator, Theta
@@ -217,6 +218,8 @@ class Fit(Displayed):
         """
         said = self.learned.warnings(confirmed=self.confirmed is True)
         said += history_warnings(self.history)
+        if getattr(self.family, "summary", None) is not None:
+            said += shape_warnings(self.history)
         if {self.settings.get("summary", "None"), self.settings.get("discrepancy")} == {"None"}:
             said += censored_warnings(self.observed, self.closest.signal)
         if self.doubt > MUCH_DOUBT:

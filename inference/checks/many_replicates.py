@@ -15,6 +15,7 @@ from ..arguments import (
     check_callable,
     check_flag,
     check_function,
+    check_identity,
     check_progress,
     check_text,
     check_timeout,
@@ -86,8 +87,8 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
             by one. Processes must be spawned, not forked, since JAX runs threads.
         store: File that keeps every finished replicate. The same call on the same file goes
             on where the last one ended, also after a crash.
-        identity: Names what the store cannot see: anything in the code that would change the
-            draws must change it.
+        identity: Names what the store cannot see, and needs: anything in the code that would
+            change the draws must change it.
         timeout: Seconds that simulating the data of one replicate may take; one that takes longer
             has failed. What a pipeline simulates itself has a limit of its own, such as
             `FitPipeline(..., options={"timeout": 60})`.
@@ -123,6 +124,8 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     check_timeout(timeout)
     check_progress(progress)
     check_text("identity", identity)
+    if isinstance(store, str | Path):
+        check_identity(identity, "store", store)
     check_flag("independent", independent)
     check_flag("retry", retry)
     n, seed = checked_integer("n", n), checked_integer("seed", seed, 0)

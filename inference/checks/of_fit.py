@@ -125,7 +125,8 @@ def check_fit(
         sampling: Options of `Fit.sample`.
         observe: Adds to a signal what measuring adds; None adds the gaps of these data and the
             noise that the fit was given. Noise that it estimated is the simulator's own then.
-        how: Other arguments of `replicates`, such as `store`, `executor` or `seed`.
+        how: Other arguments of `replicates`, such as `store`, `executor` or `seed`; `identity` is
+            the fit's, unless given.
 
     Raises:
         ValueError: the fit has no recipe or no data, its noise cannot be drawn, or an argument is
@@ -142,5 +143,6 @@ def check_fit(
             )
         observe = LikeObserved(np.isfinite(fit.observed), noise)
     check_sampling(sampling or {})
-    made = replicates(Refit(recipe, fit.prior, sampling or {}), n=n, observe=observe, **how)
+    pipeline, how = Refit(recipe, fit.prior, sampling or {}), {"identity": recipe.identity} | how
+    made = replicates(pipeline, n=n, observe=observe, **how)
     return FitCheck(sbc(made), coverage(made), tarp(made))

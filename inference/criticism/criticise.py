@@ -260,7 +260,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         count += finished
         report(phase, finished, total)
 
-    with open_compute(executor, timeout, batch, bank) as compute:
+    identities = [one.identity for one in (experiment, *held_out, *proposals)]
+    with open_compute(executor, timeout, batch, bank, *identities) as compute:
         study = Study(experiment, prior, extensions, compute, plan or Plan(), seed, counted)
         for one in held_out:
             study.try_elsewhere(one)

@@ -1,7 +1,7 @@
 """Simulating what the bank lacks: in batches here, or on an executor."""
 
 import pickle
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Future, wait
 from contextlib import ExitStack, nullcontext
 from functools import partial
@@ -14,6 +14,11 @@ from .compute import Compute, is_pool, killed_its_worker
 from .failures import FailureKind, NoSignals, is_unusable, raised, unusable
 from .job import BATCH, BatchSimulator, Job, OneByOne, of_one_shape, run_batch
 
+CALLED = {
+    BatchSimulator: "; simulate is called with theta, name -> [b], and seeds [b], and returns b "
+    "signals; if it makes one run, give vectorised=False",
+    OneByOne: "; with vectorised=False simulate is called with theta, name -> float, and one seed",
+}
 POLL_SECONDS = 0.2  # seconds between looks at what somebody else is simulating
 
 
@@ -63,6 +68,11 @@ class Runner:
         self._elsewhere: list[Order] = []  # claimed by somebody else
         self._mine: dict[Future[Simulation], Job] = {}  # claimed here, by outcome
         self._submitted: set[Future[list[Simulation]]] = set()
+
+    def how_called(self, errors: Iterable[str]) -> str:
+        """How a user's function is called, as the end of a message, if it always misread that."""
+        misread = all(error.startswith(("TypeError", "IndexError")) for error in errors)
+        return CALLED.get(type(self.simulate), "") if misread else ""
 
     def __enter__(self) -> "Runner":
         return self

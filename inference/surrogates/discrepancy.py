@@ -256,9 +256,9 @@ class DiscrepancyFamily(Family):
         transform: "identity", "sqrt" or "log" of the discrepancy; None chooses by
             leave-one-out log predictive density.
         threshold: Rule for eps; None makes the posterior as wide as the closest run's residual
-            suggests, see `threshold.matched`, or guesses of fewer than 3 numbers more than
-            parameters; or a number on the discrepancy's own scale, which may be
-            negative where a user's discrepancy is, as a logarithm; see
+            suggests, were the discrepancy a sum of squares, see `threshold.matched`, or guesses of
+            fewer than 3 numbers more than parameters; or a number on the discrepancy's own scale,
+            which may be negative where a user's discrepancy is, as a logarithm; see
             `threshold.choose_threshold`.
     """
 

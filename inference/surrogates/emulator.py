@@ -23,7 +23,7 @@ from ..gp.process import (
     predict,
     predict_mean,
 )
-from .measurement_noise import MIN_SIZE, Remainder, shrunk_covariance
+from .measurement_noise import MIN_SIZE, ROUNDING, Remainder, shrunk_covariance
 from .squared_difference import independent
 
 EXPLAINED_SHARE = 0.9995  # of the variance, to be explained by components
@@ -206,7 +206,7 @@ class Emulator(NamedTuple):
     @property
     def equal(self) -> bool:
         """Whether all outputs are the same."""
-        return self.basis.used == 0 and self.remainder.total == 0.0
+        return self.basis.used == 0 and self.remainder.total <= ROUNDING * len(self.basis.scale)
 
     @property
     def scores(self) -> GP:

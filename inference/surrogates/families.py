@@ -1,6 +1,9 @@
 """The family that a user means: an object, a name, or what the options belong to."""
 
+from collections.abc import Callable, Iterable
 from dataclasses import fields
+from difflib import get_close_matches
+from inspect import signature
 from typing import Any, cast
 
 from ..arguments import check_called
@@ -54,13 +57,25 @@ def resolve(surrogate: str | Family | None, options: dict[str, Any]) -> Family:
             f"surrogate must be one of {tuple(FAMILIES)}, an object of a class whose base is "
             f"`Family`, or None, got {surrogate!r:.100}"
         )
-    unknown = options.keys() - option_names(surrogate)
-    if unknown:
+    own = sorted(option_names(surrogate))
+    for unknown in sorted(options.keys() - {*own}):
+        of = [name for name in FAMILIES if unknown in option_names(name)] or "none"
         raise ValueError(
-            f"there is no argument {', '.join(sorted(unknown))}; the surrogate {surrogate!r} has "
-            f"the options {tuple(sorted(option_names(surrogate)))}"
+            f"{unknown} is an option of the surrogate {of}, not of {surrogate!r}, which has {own}"
         )
     return FAMILIES[str(surrogate)](**options)
+
+
+def check_options(options: Iterable[str], of: Callable[..., Any]) -> None:
+    """Raise ValueError for options that are neither arguments of a function nor any surrogate's."""
+    own = [name for name in signature(of).parameters if name not in ("self", "options")]
+    of_families = sorted(set().union(*map(option_names, FAMILIES)))
+    for unknown in sorted(set(options) - {*own, *of_families}):
+        near = " or ".join(get_close_matches(unknown, [*own, *of_families]))
+        raise ValueError(
+            f"there is no argument {unknown}{near and f'; do you mean {near}?'} There are "
+            f"{', '.join(own)}, and of the surrogates {', '.join(of_families)}"
+        )
 
 
 def option_names(name: Any) -> set[str]:

@@ -19,6 +19,7 @@ LEAST_OF_MISFIT = 1.0 / 32.0  # least sigma over the smallest expected misfit, w
 MOST = 2.0  # largest sigma over the larger of the two
 MOST_OF_NOISE = 8.0  # the same of a few numbers' noise, whose posterior has a heavy tail
 UNIT = 1e-3  # of the outputs' sd, added to the given noise: the misfit of one that is 0
+ROUNDING = 1e-24  # variance in units of the outputs', up to which it is none
 MIN_SIZE = 1e-4  # of a residual, in units of the outputs' sd: data are never without noise
 
 
@@ -162,11 +163,12 @@ def reduce(
     """
     vectors, observed, factors = columns
     k, used = vectors.shape[1], int(np.any(vectors, 0).sum())
-    floor = 1e-12 * float(np.mean(vectors**2))  # where nothing at all is noisy
+    white = white + 1e-12 * float(np.mean(vectors**2))
+    white = np.where(white > ROUNDING, white, MIN_SIZE**2)  # where nothing at all is noisy
     fresh = np.diff(layout.channel, prepend=-1) != 0
     gap = np.where(fresh, 0, np.diff(layout.sample, prepend=0))
     result, log_det = whiten(
-        np.column_stack([vectors, observed, factors]), white + floor, fresh, gap, nodes
+        np.column_stack([vectors, observed, factors]), white, fresh, gap, nodes
     )
     whitened = np.moveaxis(result, 1, 0)
     basis, target = whitened[:, :, :used], whitened[:, :, k : k + 1]

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arguments import checked_array
+from ..simulations.failures import raised
 from .measurement_noise import Layout
 
 MIN_SERIES = 5  # samples from which an output counts as a series, whose values share a scale
 MIN_LONG = 16  # samples of a series from which their residual tells the size of the noise
+LEAST_UNIT = 1e-100  # smaller numbers have no square
 MAX_VALUES = 2000  # values; neighbouring samples of longer series are averaged
 
 Summary = Callable[[np.ndarray], np.ndarray]
@@ -91,7 +93,10 @@ class Output:
             channel = self.layout.channel
             mean = np.bincount(channel, variance) / np.bincount(channel)
             variance = mean[channel]
-        return np.where(variance > 0, np.sqrt(variance), 1.0)
+        # a constant simulator has no other unit than its output, if that has a square
+        size = np.abs(values).max()
+        unit = size if size > LEAST_UNIT and not variance.any() else 1.0
+        return np.where(variance > 0, np.sqrt(variance), unit)
 
 
 def check_shape(what: str, observed: tuple[int, ...], simulated: tuple[int, ...]) -> None:
@@ -117,14 +122,23 @@ def describe(observed: np.ndarray, summary: Summary | None) -> Output:
     """The map from outputs like `observed` to values; NaN is a missing sample.
 
     Raises:
-        ValueError: nothing is finite, or something infinite.
+        ValueError: nothing is finite, or the summary fails, or is not where samples are.
     """
-    summarised = summarise(summary, observed)
-    finite = np.isfinite(summarised)
-    if np.isinf(summarised).any():
+    try:
+        summarised = summarise(summary, observed)
+    except (Exception, SystemExit) as error:  # whatever the user's code raises
         raise ValueError(
-            f"summary must not return infinite values, got {infinities(summarised)} of observed; "
-            "leave them out, or choose another summary, such as np.log1p for np.log of zeros"
+            f"the summary failed on observed, of shape {observed.shape} ({raised(error)}); it is "
+            "called with one output, not with a batch of them"
+        ) from error
+    finite = np.isfinite(summarised)
+    # value by value, it leaves a missing sample missing
+    missing = np.isnan(observed) if summarised.shape == observed.shape else False
+    if bad := np.flatnonzero(~finite & ~(np.isnan(summarised) & missing)).tolist():
+        raise ValueError(
+            f"summary must return finite values, got {infinities(summarised)} of observed, at "
+            f"{bad!r:.60}, from {np.isnan(observed).sum()} missing samples; leave them out, or "
+            "choose another summary, such as np.nanmean, or np.log1p for np.log of zeros"
         )
     if not finite.any():
         raise ValueError("observed must have a finite value, got none")

@@ -162,24 +162,33 @@ class SignalSurrogate(OfProcesses):
     def constants(self) -> dict[str, np.ndarray]:
         """Components, variances and noise."""
         weights = self.node_weights
-        needed = self.known is None or self._missed()
-        misfit = needed * np.sqrt(weights @ self.nodes.sigma**2) * self.emulator.basis.scale
-        best = self.best_features[None]
-        given = self.scale.sds(self.scale.back(best))[0, 0]
+        given, misfit = self._noise_sds
         return {
             "components": np.asarray(self.emulator.basis.used),
             "explained_variance": np.asarray(self.emulator.basis.explained),
             "run_to_run_noise_share": np.asarray(self.emulator.noise_share),
             # of the output's first value; a channel's noise is in proportion to its scale
-            "measurement_noise_sd": np.hypot(self.scale.in_units(best, misfit[None])[0, 0], given),
+            "measurement_noise_sd": np.hypot(misfit, given),
             "measurement_noise_correlation": weights @ self.nodes.rho,
         }
 
+    @property
+    def _noise_sds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Sds in the output's first value of noise that is given, and of what is estimated: noise
+        where none is given, else a misfit where there is one."""
+        needed = self.known is None or self._missed()
+        scale, best = self.emulator.basis.scale, self.best_features[None]
+        misfit = needed * np.sqrt(self.node_weights @ self.nodes.sigma**2) * scale
+        given = self.scale.sds(self.scale.back(best))[0, 0]
+        return given, self.scale.in_units(best, misfit[None])[0, 0]
+
     def described(self) -> list[str]:
         """The noise, and how it was found."""
-        noise = float(self.constants()["measurement_noise_sd"])
-        how = "estimated" if self.known is None else "given" + self._missed() * ", and a misfit"
-        return [f"measurement noise of sd {noise:.3g} in the first value, {how}"]
+        given, found = self._noise_sds
+        if self.known is None:
+            return [f"measurement noise of sd {found:.3g} in the first value, estimated"]
+        misfit = f", and a misfit of sd {found:.3g}" if self._missed() else ""
+        return [f"measurement noise of sd {given:.3g} in the first value, given{misfit}"]
 
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new simulated output's values at u [n, d]: [n, m], [n, m].
@@ -196,32 +205,31 @@ class SignalSurrogate(OfProcesses):
     @property
     def fits(self) -> bool:
         """Whether parameters and noise explain what was observed."""
-        if not self.emulator.basis.used and self.emulator.size is None:
-            return True
-        return not (self._missed() or self._smooth() or self._outside() or self.unreached)
+        return not (self._unexplained() or self.unreached)
 
     def warnings(self, *, confirmed: bool = False) -> list[str]:
         """Warnings of the emulator's own checks, unless it is confirmed, of noise and misfit, and
         of the observed values."""
         repeats, sized = self.emulator.repeats, self.emulator.size is not None
         if self.emulator.basis.used == 0 and not sized:
-            if self.emulator.equal:
-                return [warnings.EQUAL, *self._of_data()]
             fast = len(repeats) and not repeats.any()
-            return [warnings.TOO_FAST if fast else warnings.UNPREDICTED, *self._of_data()]
+            unknown = warnings.TOO_FAST if fast else warnings.UNPREDICTED
+            said = [warnings.EQUAL if self.emulator.equal else unknown]
+            return [*said, *self._unexplained(), *self._of_data()]
         said = [] if confirmed else warnings.complaints(self.emulator.loo_errors(), "output")
         said += warnings.noise_warnings(self.emulator.noise_share, repeats, sized)
-        if self._outside():
-            said.append(warnings.OUTSIDE)
-        elif self._missed():
-            said.append(warnings.MISFIT)
-        elif self._smooth():
-            said.append(warnings.SMOOTH)
-        elif self._generous():
-            said.append(warnings.GENEROUS)
+        said += self._unexplained() or [warnings.GENEROUS] * self._generous()
         if self.known is None and len(self.observed) - self.u.shape[1] < MIN_FREEDOM:
             said.append(warnings.FEW_NUMBERS)
         return said + self._of_data()
+
+    def _unexplained(self) -> list[str]:
+        """Why parameters and noise do not explain what was observed, if they do not."""
+        if self._outside():
+            return [warnings.OUTSIDE]
+        if self._missed():
+            return [warnings.MISFIT]
+        return [warnings.SMOOTH] if self._smooth() else []
 
     def _of_data(self) -> list[str]:
         """Warn of positive values that span decades, and of a number that no run reaches."""
@@ -364,10 +372,7 @@ def observe(
     factors, white = _noise(emulator, given)
     kept = None if previous is None else (previous.nodes, previous.log_prior)
     nodes, log_prior = kept or _nodes(emulator, output, observed, given, misfit)
-    if emulator.equal:  # nothing to compare
-        reduced = Reduced(*(np.zeros((len(log_prior), *[0] * axes)) for axes in (1, 2, 0, 0, 0)))
-    else:
-        reduced = reduce((vectors, target, factors), white, output.layout, nodes)
+    reduced = reduce((vectors, target, factors), white, output.layout, nodes)
     own, used = emulator.noise_variance, basis.used
     other = np.sum(white - remainder.white) + np.sum(factors[:, remainder.factors.shape[1] :] ** 2)
     other = other + len(target) * nodes.sigma**2
@@ -406,7 +411,7 @@ def _nodes(
     misfit: float,
 ) -> Weighted:
     """Sizes and correlations that the unknown noise or misfit may have."""
-    if emulator.equal or (given is not None and not misfit):
+    if given is not None and not misfit:
         return NO_MEASUREMENT_NOISE
     miss = emulator.smallest_misfit(observed, _screen(emulator, MISFIT_POINTS))
     if given is None:

@@ -61,7 +61,8 @@ LOW_THRESHOLD = (
     "posterior lies is chance; give a larger threshold, or none"
 )
 NOISY = (
-    "run-to-run noise of the discrepancy exceeds what the data tell apart: the posterior is wider "
+    "what the parameters do not predict of the discrepancy, because the simulator is random or so "
+    "few runs do not show how it varies, exceeds what the data tell apart: the posterior is wider "
     "than the data make it, and its centre is as uncertain; simulate more, average the noise out, "
     'or use surrogate="signal"'
 )
@@ -197,6 +198,16 @@ def history_warnings(history: History) -> list[str]:
             "signals follow from theta and seed"
         )
     return said
+
+
+def shape_warnings(history: History) -> list[str]:
+    """A warning if a summary is taken of data of another shape than all simulations have."""
+    shapes, seen = {one.shape for one in history.outputs if one is not None}, history.observed_shape
+    said = (
+        f"observed has the shape {seen}, simulations {history.signal_shape}: observed is to be the "
+        "raw output, of which the summary is taken as of each simulation's"
+    )
+    return [said] if len(shapes) == 1 and seen not in shapes else []  # lengths may be random
 
 
 def unconfirmed_warnings(history: History, runs: np.ndarray) -> list[str]:

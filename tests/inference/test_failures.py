@@ -19,9 +19,9 @@ def test_what_raised_is_tried_again_by_the_next_call(tmp_path, prior, observed, 
 
     with inference.SimulationBank(tmp_path / "b.sqlite") as bank:
         with pytest.raises(RuntimeError, match="no licence"):
-            inference.fit(licensed, prior, observed, budget=9, bank=bank)
+            inference.fit(licensed, prior, observed, budget=9, bank=bank, identity="line")
         broken[0] = False
-        mended = inference.fit(licensed, prior, observed, budget=9, bank=bank)
+        mended = inference.fit(licensed, prior, observed, budget=9, bank=bank, identity="line")
     plain = inference.fit(simulate, prior, observed, budget=9)
     np.testing.assert_array_equal(mended.history.signals, plain.history.signals)
 
@@ -45,10 +45,10 @@ def test_too_few_successes_are_an_error_that_loses_nothing(tmp_path, prior, obse
 
     path = tmp_path / "b.sqlite"
     with pytest.raises(RuntimeError, match=f"^{successes} of 7 .*no licence") as caught:
-        inference.fit(fragile, prior, observed, budget=7, batch=1, bank=path)
+        inference.fit(fragile, prior, observed, budget=7, batch=1, bank=path, identity="line")
     assert str(path) in str(caught.value)
     with inference.SimulationBank(path) as bank:
-        assert len(bank.simulations("").seeds) == successes
+        assert len(bank.simulations("line").seeds) == successes
     calls.clear()
     with pytest.raises(RuntimeError, match=f"^{successes} of 7 ") as caught:
         inference.fit(fragile, prior, observed, budget=7, batch=1)
@@ -81,12 +81,13 @@ def test_a_single_run_s_signal_of_wrong_shape_is_told_as_the_user_made_it(prior,
 def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, simulate, shape):
     message = re.escape(f"shape (4, 30), one row per theta, got {shape}")
     with inference.SimulationBank() as bank:
+        kept = {"bank": bank, "identity": "line"}
         with pytest.raises(ValueError, match=message) as refused:
-            inference.fit(lambda theta, seeds: np.zeros(shape), prior, observed, bank=bank)
+            inference.fit(lambda theta, seeds: np.zeros(shape), prior, observed, **kept)
         assert ("vectorised=False" in str(refused.value)) == (shape == (30,))
         assert len(bank) == 0
         # and nothing is claimed any more, for which this call would wait
-        assert inference.fit(simulate, prior, observed, budget=7, bank=bank).failures == {}
+        assert inference.fit(simulate, prior, observed, budget=7, **kept).failures == {}
 
 
 @pytest.mark.slow
@@ -173,3 +174,31 @@ def test_outputs_of_any_size_are_learned_from_or_told(prior, observed, simulate,
         else:
             fit = engine.fit(warn=False)
             assert np.isfinite(fit.log_prob({"slope": 0.3, "offset": 0.6}))
+
+
+@pytest.mark.parametrize(
+    ("simulate", "vectorised", "told"),
+    [
+        (lambda theta, seeds: float(theta["slope"]) * np.ones(30), True, "vectorised=False"),
+        (lambda theta, seed: theta["slope"][:, None] * np.ones(30), False, "name -> float"),
+    ],
+)
+def test_a_simulator_that_misreads_its_call_is_told_the_call(
+    prior, observed, simulate, vectorised, told
+):
+    with pytest.raises(
+        RuntimeError, match=f"TypeError.* simulate is called with .*{told}|TypeError.*{told}"
+    ):
+        inference.fit(simulate, prior, observed, vectorised=vectorised)
+
+
+@pytest.mark.parametrize("vectorised", [True, False])
+def test_a_simulator_of_theta_alone_is_refused_before_a_run(prior, observed, vectorised):
+    with pytest.raises(ValueError, match=r"^simulate must be called with \(theta, seed"):
+        inference.fit(lambda theta: 1 / 0, prior, observed, vectorised=vectorised)
+
+
+def test_a_discrepancy_of_missing_samples_is_told_their_number(prior, observed, simulate):
+    gappy = np.where(np.arange(30) < 2, np.nan, observed)
+    with pytest.raises(RuntimeError, match="observed holds 2 NaN"):
+        inference.fit(simulate, prior, gappy, discrepancy=lambda a, b: np.sum((a - b) ** 2))

@@ -50,7 +50,7 @@ def test_a_larger_budget_goes_on_where_the_smaller_ended(tmp_path, prior, observ
 
     with ThreadPoolExecutor(2) as pool:
         options = {"acquisition": jointly, "confirm": 0, "executor": pool}
-        kept = {**options, "bank": tmp_path / "b.sqlite"}
+        kept = {**options, "bank": tmp_path / "b.sqlite", "identity": "line"}
         small = inference.fit(counted, prior, observed, budget=9, **kept)
         assert len(calls) == 9
         large = inference.fit(counted, prior, observed, budget=12, **kept)
@@ -79,7 +79,7 @@ def test_earlier_simulations_count_beside_the_budget(prior, observed, simulate):
 
 def test_another_simulators_signals_in_a_bank_are_refused(tmp_path, prior, observed, simulate):
     path = tmp_path / "b.sqlite"
-    inference.fit(simulate, prior, observed, budget=7, bank=path)
+    inference.fit(simulate, prior, observed, budget=7, bank=path, identity="line")
 
     def shorter(theta, seeds):
         return simulate(theta, seeds)[:, :20]
@@ -88,7 +88,7 @@ def test_another_simulators_signals_in_a_bank_are_refused(tmp_path, prior, obser
     with ThreadPoolExecutor(2) as pool:
         options = {"budget": 7, "bank": path, "executor": pool}
         with pytest.raises(ValueError, match=told):
-            inference.fit(shorter, prior, observed[:20], **options)
+            inference.fit(shorter, prior, observed[:20], identity="line", **options)
         named = inference.fit(shorter, prior, observed[:20], identity="20", **options)
     assert named.failures == {}
 
@@ -108,7 +108,8 @@ def test_an_executor_s_results_are_stored_as_they_come(tmp_path, prior, observed
         return simulate(theta, seeds)
 
     with inference.SimulationBank(path) as bank, ThreadPoolExecutor(2) as pool:
-        inference.fit(slow_first, prior, observed, budget=7, bank=bank, executor=pool)
+        options = {"bank": bank, "identity": "line", "executor": pool}
+        inference.fit(slow_first, prior, observed, budget=7, **options)
     assert stored[0] >= 1
 
 
@@ -117,7 +118,7 @@ def test_a_warning_points_at_who_called_fit(prior, observed):
         return np.ones((len(seeds), 30))
 
     with pytest.warns(inference.EmulatorWarning, match="all simulations are equal") as caught:
-        inference.fit(constant, prior, observed, budget=12)
+        inference.fit(constant, prior, np.ones(30), budget=12)
     assert {Path(warning.filename) for warning in caught} == {Path(__file__)}
 
 
@@ -157,7 +158,7 @@ def test_a_fit_says_what_it_is_in_a_few_lines(line_fit, prior, observed, simulat
     assert shown(line_fit)["simulations"].startswith("20,")
     assert "discrepancy" in shown(line_fit)["surrogate"]
     assert all(name in shown(line_fit)["parameters"] for name in prior.names)
-    engine = inference.Bolfi(prior, observed)
+    engine = inference.Bolfi(prior, np.ones(30))
     theta = engine.ask(8)
     signals = np.ones((8, 30))
     signals[:2] = np.nan
@@ -239,7 +240,7 @@ def test_a_warning_that_is_an_error_loses_no_simulation(tmp_path, prior, observe
         calls.extend(seeds)
         return np.ones((len(seeds), 30))
 
-    given = {"budget": 12, "confirm": 0, "bank": tmp_path / "b.sqlite", "progress": False}
+    given = {"budget": 12, "confirm": 0, "bank": tmp_path / "b.sqlite", "identity": "ones"}
     with pytest.raises(inference.EmulatorWarning, match="all simulations are equal"):
         inference.fit(constant, prior, observed, **given)
     fit = inference.fit(constant, prior, observed, warn=False, **given)

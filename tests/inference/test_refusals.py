@@ -17,6 +17,7 @@ import matplotlib
 import numpy as np
 import numpyro.distributions as dist
 import pytest
+from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism import Extension
 from bolfi_liquids.inference.simulations import (
     BatchSimulator,
@@ -447,3 +448,41 @@ def test_a_simulator_of_one_thread_takes_no_pool_of_threads():
         assert refusal(*MORE["open_compute"], "executor") == "it is taken"
         alone = partial(MORE["open_compute"][0], one_thread=True)
         assert refusal(alone, {"executor": pool}, "executor") == ""
+
+
+def test_what_keeps_results_needs_the_simulators_name(cases, tmp_path):
+    """Else a mended simulator is given the runs of the one before."""
+    call, good = cases["fit"]
+    told = "^identity must name the simulator and its version where (bank|store)= keeps"
+    with inference.SimulationBank() as bank:
+        for kept in (tmp_path / "b.sqlite", str(tmp_path / "b.sqlite"), bank):
+            with pytest.raises(ValueError, match=told):
+                call(**good, bank=kept)
+    with pytest.raises(ValueError, match=told):
+        inference.FitPipeline(len, good["prior"], options={"bank": tmp_path / "b.sqlite"})
+    with pytest.raises(ValueError, match=told):
+        inference.replicates(print, len, good["prior"], 2, store=tmp_path / "b.sqlite")
+    data = criticism.Experiment(len, OBSERVED, criticism.KnownNoise(1.0), "named")
+    with pytest.raises(ValueError, match=told):
+        criticism.criticise(
+            data,
+            good["prior"],
+            {},
+            held_out=[criticism.Experiment(len, OBSERVED + 1.0, data.noise)],
+            bank=tmp_path / "b.sqlite",
+        )
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"budgt": 10}, "do you mean budget"),
+        ({"compnents": 3}, "do you mean components"),
+        ({"surrogate": "discrepancy", "components": 3}, r"of the surrogate \['signal'\]"),
+    ],
+)
+def test_a_misspelt_or_misplaced_argument_is_met_with_the_right_one(cases, given, told):
+    call, good = cases["fit"]
+    with pytest.raises(ValueError, match=told):
+        call(**good | given)

@@ -159,10 +159,11 @@ def test_an_error_that_is_no_number_is_named_and_nothing_is_simulated_twice(erro
         return decay(theta, seeds)
 
     bank = tmp_path / "bank.sqlite"
+    kept = {"bank": bank, "identity": "decay"}
     with pytest.raises(ValueError, match=rf"^error of Until .* 16 .*{told}.*{bank}"):
-        fitted(simulate, budget=inference.Until(error=error), bank=bank)
+        fitted(simulate, budget=inference.Until(error=error), **kept)
     assert len(calls) == 16
-    fitted(simulate, budget=inference.Until(most=26, error=lambda fit: np.inf), bank=bank)
+    fitted(simulate, budget=inference.Until(most=26, error=lambda fit: np.inf), **kept)
     assert len(calls) == len(set(calls)) == 26
 
 

@@ -44,7 +44,8 @@ log, store, out = sys.argv[1:]
 prior = inference.Prior({"a": dist.Normal(0.0, 1.0)})
 with ThreadPoolExecutor(2) as pool:
     made = inference.replicates(
-        Logged(log), simulate, prior, 24, draws=31, independent=True, executor=pool, store=store
+        Logged(log), simulate, prior, 24, draws=31, independent=True, executor=pool, store=store,
+        identity="a",
     )
 np.save(out, made.draws)
 """
@@ -70,7 +71,7 @@ class Guess:
 
 
 def run(pipeline=None, n=12, simulate=simulate, prior=PRIOR, **options):
-    options = {"draws": 15, "independent": True, "progress": False} | options
+    options = {"draws": 15, "independent": True, "identity": "a b", "progress": False} | options
     return inference.replicates(pipeline or Guess(), simulate, prior, n, **options)
 
 

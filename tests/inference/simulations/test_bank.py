@@ -70,9 +70,9 @@ def test_a_path_that_cannot_be_used_is_named(tmp_path, simulate, prior, kind):
     message = rf"{re.escape(str(path))} cannot be used as a {kind} \(unable to open"
     with pytest.raises(ValueError, match=message):
         if kind == "simulation bank":
-            inference.fit(simulate, prior, np.zeros(30), bank=path)
+            inference.fit(simulate, prior, np.zeros(30), bank=path, identity="line")
         else:
-            inference.replicates(print, simulate, prior, 2, store=path)
+            inference.replicates(print, simulate, prior, 2, store=path, identity="line")
 
 
 def test_all_simulations_of_one_identity(tmp_path):

@@ -157,14 +157,14 @@ def test_a_dead_worker_is_explained_and_the_rest_is_kept(
     path, mended = tmp_path / "b.sqlite", tmp_path / "mended"
     simulate = worker_side.Deadly(str(mended), simulation_seed(0, 6))
     with spawned(2) as pool, pytest.raises(RuntimeError) as caught:
-        inference.fit(simulate, prior, observed, bank=path, **options(pool))
+        inference.fit(simulate, prior, observed, bank=path, identity="line", **options(pool))
     for part in ("lost its workers", f"seed {simulation_seed(0, 6)}", str(path), "new executor"):
         assert part in str(caught.value)
     with inference.SimulationBank(path) as bank:
         assert 4 <= len(bank) <= 8  # 0 to 3 were told before 6 was asked
     mended.touch()
     with spawned(2) as pool:
-        fit = inference.fit(simulate, prior, observed, bank=path, **options(pool))
+        fit = inference.fit(simulate, prior, observed, bank=path, identity="line", **options(pool))
     assert_same(fit, by_hand)
 
 
@@ -218,11 +218,13 @@ def test_after_an_error_the_bank_is_free_for_the_next_call(prior, observed, simu
     with inference.SimulationBank() as bank:
         with ThreadPoolExecutor(2) as pool:
             with pytest.raises(ValueError, match="signals of shape"):
-                inference.fit(misshapen, prior, observed, bank=bank, **options(pool))
+                inference.fit(
+                    misshapen, prior, observed, bank=bank, identity="line", **options(pool)
+                )
             finish.set()
         assert 1 <= len(bank) <= 2  # the other worker may have begun another
         five = {"budget": 5, "initial": 5, "confirm": 0, "warn": False}
-        fit = inference.fit(simulate, prior, observed, bank=bank, **five)
+        fit = inference.fit(simulate, prior, observed, bank=bank, identity="line", **five)
     assert fit.failures == {}
 
 
@@ -236,7 +238,7 @@ def test_runs_at_the_same_time_share_what_they_simulate(prior, observed, simulat
         return simulate(theta, seeds)
 
     def run(shift):
-        given = {**options(pool), "bank": bank}
+        given = {**options(pool), "bank": bank, "identity": "line"}
         return inference.fit(counted, prior, observed + shift, **given)
 
     with (

@@ -44,7 +44,8 @@ def run(log, bank, out, pool):
     with make(BATCH) as executor:
         fit = inference.fit(
             functools.partial(simulate, log), prior, 0.3 * np.linspace(0, 1, 20),
-            budget=BUDGET, batch=BATCH, confirm=0, bank=bank, executor=executor)
+            budget=BUDGET, batch=BATCH, confirm=0, bank=bank, identity="line",
+            executor=executor)
     draws = fit.sample("emcee", chains=2, draws=64, warmup=20)["posterior"]["a"]
     np.savez(out, best=fit.best["a"], draws=draws, tried=fit.simulations["a"],
              signals=fit.simulations["signal"], seeds=fit.simulations["seed"])
