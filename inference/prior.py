@@ -148,8 +148,8 @@ class Prior:
             alone = [self.to_array(self.from_unit(row)) for row in u[:4]]
             alike = np.allclose(self.to_array(theta)[:4], alone)
             alike = alike and np.allclose(self.to_unit(theta), u, atol=1e-6)
-        except (TypeError, ValueError) as error:
-            alike, told = False, error
+        except (TypeError, ValueError, NotImplementedError) as error:
+            alike, told = False, str(error) or f"{type(error).__name__} of numpyro"
         if not alike:
             raise ValueError(
                 "the model of a prior must take arrays [n] as its parameters, and have proper "

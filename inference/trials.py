@@ -14,8 +14,8 @@ from .result import Fit
 from .types import Theta
 
 OTHERWISE = (
-    "give a prior, in which a whole number from 1 to 20 is Uniform(0.5, 20.5); of several choices "
-    "take the trials of one, as a data frame with a column `loss`"
+    "give a prior, in which a whole number from 1 to 20 is Uniform(0.5, 20.5); or a data frame "
+    "with a column `loss`, of the trials of one choice and without parameters of one value"
 )
 """The cure where the search space of a study is no prior."""
 
@@ -188,7 +188,7 @@ def _search_ranges(study: Any) -> Prior:
     done = _finished(study)
     found = {}
     for name, of in done[0].distributions.items():
-        real = type(of).__name__ == "FloatDistribution"
+        real = type(of).__name__ == "FloatDistribution" and of.low < of.high
         due = f"choose {name!r} from a range of real numbers"
         require(real, "without a prior trials", due, of, cure=OTHERWISE)
         others = [t.distributions[name] for t in done if t.distributions[name] != of]
