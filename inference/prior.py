@@ -400,8 +400,8 @@ def _at_medians(model: Callable[[], object]) -> dict[str, dist.Distribution]:
 
 @in_float64
 def _checked(name: str, distribution: object) -> Univariate:
-    named = isinstance(name, str) and name and "/" not in name
-    require(named, "a parameter's name", "be text without '/'", name)
+    named = isinstance(name, str) and name and name.isprintable() and "/" not in name
+    require(named, "a parameter's name", "be printable text without '/'", name)
     due = "be none that is reserved for results"
     require(name not in RESERVED, "a parameter's name", due, name, cure="choose another name")
     its = f"prior of {name!r}"
