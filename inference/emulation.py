@@ -24,12 +24,11 @@ class Emulation:
             runs included.
     """
 
-    def __init__(self, prior: Prior, learned: Emulator, finite: np.ndarray):
+    def __init__(self, prior: Prior, learned: Emulator, outputs: np.ndarray):
         self.prior, self._learned = prior, learned
-        self.left_out = np.full((len(finite), learned.outputs.shape[1]), np.nan)
-        self.left_out[finite] = learned.left_out()
-        self.missed = np.full_like(self.left_out, np.nan)
-        self.missed[finite] = learned.outputs - self.left_out[finite]
+        self.left_out = np.full_like(outputs, np.nan)
+        self.left_out[np.isfinite(outputs).all(axis=1)] = learned.left_out()
+        self.missed = outputs - self.left_out
 
     @in_float64
     def predict(self, theta: Theta) -> np.ndarray:
@@ -81,4 +80,4 @@ def emulate(prior: Prior, theta: Theta, outputs: ArrayLike, scale: ArrayLike) ->
     require(positive, "scale", due, weights)
     limits, u = EmulatorLimits(COMPONENTS, predicted=None), prior.to_unit(rows)[finite]
     learned = vectors.emulate(u, known[finite], lambda _: weights, limits, None, prior.tails)
-    return Emulation(prior, learned, finite)
+    return Emulation(prior, learned, known)

@@ -1,5 +1,6 @@
 """One HTML page that shows a fit, with nothing from outside it; imports Matplotlib and Jinja."""
 
+import warnings
 from base64 import b64encode
 from collections.abc import Callable, Iterator
 from importlib.resources import files
@@ -95,7 +96,9 @@ def _rows(fit: Any, tree: Any) -> Iterator[Row]:
 def _picture(draw: Callable[[Axes], None], alt: str, caption: str) -> Picture:
     figure, held = Figure(SIZE, layout="constrained"), BytesIO()
     draw(bare(figure.subplots()))
-    figure.savefig(held, format="svg", metadata={"Date": None}, transparent=True)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph")  # letters are the browser's, of any script
+        figure.savefig(held, format="svg", metadata={"Date": None}, transparent=True)
     source = f"data:image/svg+xml;base64,{b64encode(held.getvalue()).decode()}"
     return Picture(source, alt, caption)
 

@@ -148,8 +148,8 @@ class Prior:
             alone = [self.to_array(self.from_unit(row)) for row in u[:4]]
             alike = np.allclose(self.to_array(theta)[:4], alone)
             alike = alike and np.allclose(self.to_unit(theta), u, atol=1e-6)
-        except (TypeError, ValueError) as error:
-            alike, told = False, error
+        except (TypeError, ValueError, NotImplementedError) as error:
+            alike, told = False, str(error) or f"{type(error).__name__} of numpyro"
         if not alike:
             raise ValueError(
                 "the model of a prior must take arrays [n] as its parameters, and have proper "
@@ -400,8 +400,8 @@ def _at_medians(model: Callable[[], object]) -> dict[str, dist.Distribution]:
 
 @in_float64
 def _checked(name: str, distribution: object) -> Univariate:
-    named = isinstance(name, str) and name and "/" not in name
-    require(named, "a parameter's name", "be text without '/'", name)
+    named = isinstance(name, str) and name and name.isprintable() and "/" not in name
+    require(named, "a parameter's name", "be printable text without '/'", name)
     due = "be none that is reserved for results"
     require(name not in RESERVED, "a parameter's name", due, name, cure="choose another name")
     its = f"prior of {name!r}"

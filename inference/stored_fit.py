@@ -189,7 +189,8 @@ def _family(
         name = settings["surrogate"]
         cure = "give load(path, surrogate=...) the one with which the fit was made"
         require(made["own_family"], "surrogate", f"be {name!r}", surrogate, cure=cure)
-        held = {n.removeprefix(OPTION): v for n, v in arrays.items() if n.startswith(OPTION)}
+        # a number of NumPy is one again, and no array
+        held = {n.removeprefix(OPTION): v[()] for n, v in arrays.items() if n.startswith(OPTION)}
         stored = {**made["options"], **held}
         for missing in sorted(option_names(name) - {*stored, *given}):
             cure = f"give load(path, {missing}=...) what the fit was made with"

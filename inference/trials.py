@@ -15,7 +15,8 @@ from .types import Theta
 
 ONE_CHOICE = "of several choices take the trials of one, as a data frame with a column `loss`"
 OTHERWISE = (
-    f"give a prior, in which a whole number from 1 to 20 is Uniform(0.5, 20.5); {ONE_CHOICE}"
+    f"give a prior, in which a whole number from 1 to 20 is Uniform(0.5, 20.5); {ONE_CHOICE}, and "
+    "leave parameters of one value out"
 )
 """The cure where the search space of a study is no prior."""
 
@@ -194,7 +195,7 @@ def _search_ranges(study: Any) -> Prior:
     done = _finished(study)
     found = {}
     for name, of in done[0].distributions.items():
-        real = type(of).__name__ == "FloatDistribution"
+        real = type(of).__name__ == "FloatDistribution" and of.low < of.high
         due = f"choose {name!r} from a range of real numbers"
         require(real, "without a prior trials", due, of, cure=OTHERWISE)
         others = [t.distributions[name] for t in done if t.distributions[name] != of]

@@ -292,9 +292,3 @@ class SurrogateView:
             for part in self.learned.predict(u.reshape(-1, u.shape[-1]))
         )
         return mean, sd
-
-    @property
-    @in_float64
-    def warnings(self) -> list[str]:
-        """Warnings of the surrogate's own checks and of the observed values, in sentences."""
-        return self.learned.warnings()

@@ -308,6 +308,10 @@ def of_choices(trial):
     )
 
 
+def of_one_value(trial):
+    return trial.suggest_float("a", -3, 3) ** 2 + trial.suggest_float("b", 1, 1)
+
+
 def of_branches(trial):
     a = trial.suggest_float("a", -3, 3)
     return a**2 if trial.number % 2 else a**2 + trial.suggest_float("b", -2, 6) ** 2
@@ -326,6 +330,7 @@ def of_two_objectives(trial):
     [
         (of_whole_numbers, {}, r"'layers' .* got IntDistribution.* Uniform\(0.5, 20.5\)"),
         (of_choices, {}, "'kind' .* got CategoricalDistribution.* give a prior"),
+        (of_one_value, {}, "'b' .* got FloatDistribution.* without parameters of one value"),
         (of_branches, {}, r"all have the parameters .* data frame"),
         (of_changing_ranges, {}, r"all choose 'a' from FloatDistribution.* give a prior"),
         (of_two_objectives, {"directions": ["minimize"] * 2}, "one objective"),

@@ -191,6 +191,12 @@ def a_key():
     numpyro.sample("a", dist.Uniform(0.0, jax.random.uniform(numpyro.prng_key())))
 
 
+def a_transform():
+    a = numpyro.sample("a", dist.Uniform(0.0, 1.0))
+    moved = dist.transforms.AffineTransform(a, 1.0 + a)
+    numpyro.sample("b", dist.TransformedDistribution(dist.Normal(), moved))
+
+
 def a_parameter():
     numpyro.sample("a", dist.Normal(numpyro.param("place", 0.0), 1.0))
 
@@ -234,6 +240,7 @@ def the_same_twice():
         (handlers.scale(chain, 0.5), "got the sample 'a'.* a scale"),
         (handlers.substitute(chain, {"b": 0.1}), "got the sample 'b'.* whose value is set"),
         (a_key, "got the prng_key"),
+        pytest.param(a_transform, "NotImplementedError of numpyro", marks=pytest.mark.slow),
         (a_parameter, "got the param 'place'"),
         (a_vector, r"'a' must be univariate with shape \(\), got \(3,\)"),
         (a_branch, r"take arrays \[n\].*jnp.where"),

@@ -190,3 +190,9 @@ def test_names_of_the_results_columns_are_reserved(prior, observed, simulate):
     for name in set(fit.simulations) - set(prior.names):
         with pytest.raises(ValueError, match="reserved"):
             inference.Prior({name: dist.Normal(0.0, 1.0)})
+
+
+@pytest.mark.parametrize("name", ["", "a/b", "a\nb", "a\0b", "\ud800"])
+def test_a_name_that_no_file_or_page_can_hold_is_refused(name):
+    with pytest.raises(ValueError, match="name must be printable text"):
+        inference.Prior({name: dist.Uniform(0.0, 1.0)})

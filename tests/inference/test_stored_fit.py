@@ -47,7 +47,7 @@ def assert_same(fit, again):
     "options",
     [
         {},
-        {"noise": 0.05},
+        {"noise": np.float32(0.05), "varying_noise": np.True_},
         {"noise": np.full(30, 0.05), "misfit": 0.0},
         {"surrogate": "discrepancy", "threshold": "min_mean"},
     ],
