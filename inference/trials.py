@@ -15,8 +15,8 @@ from .types import Theta
 
 ONE_CHOICE = "of several choices take the trials of one, as a data frame with a column `loss`"
 OTHERWISE = (
-    f"give a prior, in which a whole number from 1 to 20 is Uniform(0.5, 20.5); {ONE_CHOICE}, and "
-    "leave parameters of one value out"
+    f"give a prior, in which a whole number from 1 to 20 is Uniform(0.5, 20.5); {ONE_CHOICE}, "
+    "without parameters of one value"
 )
 """The cure where the search space of a study is no prior."""
 
