@@ -26,7 +26,10 @@ from tasks import TASKS, make_reference
 def main() -> None:
     chosen = arguments()
     if chosen.page:
-        write_page(current(chosen), chosen.page)
+        rows = current(chosen)
+        if not rows:
+            sys.exit(f"{results(chosen.out)} has no results of today's code: run it without --page")
+        write_page(rows, chosen.page)
         return
     missing = [name for name in chosen.engines if not ENGINES[name].python.exists()]
     if missing:
