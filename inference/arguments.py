@@ -172,7 +172,7 @@ def checked_mapping(name: str, value: object, due: str) -> dict[str, Any]:
 def check_called(name: str, value: Any, *arguments: str) -> None:
     """Raise ValueError unless `value` can be called with so many arguments, by position."""
     try:
-        called = signature(value)
+        called = signature(value, follow_wrapped=False)
     except (TypeError, ValueError):  # of compiled code
         return
     try:
@@ -215,8 +215,7 @@ def check_text(name: str, value: object) -> None:
 
 
 def check_identity(identity: str, keeper: str, kept: object) -> None:
-    """Raise ValueError for an empty `identity` where the argument `keeper` keeps results: another
-    simulator's would be taken for its own."""
+    """Refuse an empty `identity` beside a store: results of another simulator would be reused."""
     due = f"name the simulator and its version where {keeper}= keeps what it returns"
     cure = 'give such as identity="decay 1.2", another with anything that changes the signals'
     require(identity or kept in (None, ":memory:"), "identity", due, identity, cure=cure)

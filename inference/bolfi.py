@@ -238,8 +238,7 @@ class Bolfi(Displayed):
             signals: [n, *signal_shape], or a list of n signals; these may be of any shapes where
                 a discrepancy or summary of the user's own compares them.
             seeds: Seeds of the runs [n], to be kept with the results. Of runs with equal theta,
-                seed and signal one is learned from; without seeds, what was not asked for and
-                equals a run before, in theta and signal, is a copy of it.
+                seed and signal one is learned from. Without seeds what is told twice counts twice.
             errors: Why a run failed [n], to be kept for rows of NaN; "" or None elsewhere. A text
                 counts as raised; `Fit.history.why` keeps the kinds.
 

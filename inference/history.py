@@ -58,15 +58,12 @@ class History(NamedTuple):
     @property
     def distinct(self) -> np.ndarray:
         """Which succeeded and copy no run before, in theta, seed and signal: a copy tells nothing
-        new. Without a seed any run before counts, unless this one was asked for: it may repeat that
-        on purpose."""
+        new. Without a seed a copy cannot be told from a repeated run, and counts as one."""
         distinct, seen = self.succeeded, set()
-        for i in np.flatnonzero(distinct).tolist():
-            point, seed = self._run(i)
-            signal = np.asarray(self.outputs[i]).tobytes()
-            asked = seed == UNKNOWN and self.rounds[i] != UNKNOWN
-            distinct[i] = asked or (point, seed, signal) not in seen
-            seen |= {(point, seed, signal), (point, UNKNOWN, signal)}
+        for i in np.flatnonzero(distinct & (self.seeds != UNKNOWN)).tolist():
+            run = *self._run(i), np.asarray(self.outputs[i]).tobytes()
+            distinct[i] = run not in seen
+            seen.add(run)
         return distinct
 
     @property

@@ -35,7 +35,7 @@ from .surrogates.base import Acquisition, Family
 from .surrogates.families import check_options
 from .surrogates.warnings import complain
 from .types import Simulator, SingleSimulator
-from .until import Until, check_reaches, checked_budget, enough
+from .until import Until, checked_budget, enough
 
 
 def fit(  # noqa: PLR0913  the one call that most users make
@@ -85,9 +85,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
             that run only, see `Fit.failures`; a masked value is NaN.
         prior: The parameters and their priors.
         observed: The measured signal [*signal_shape], time first, also where a `summary` is taken;
-            NaN is a missing sample. None,
-            and only so, with surrogate="log_likelihood": `simulate` then returns log likelihoods
-            [b], or [b, 2] with the sd of their noise; -inf where the data are impossible.
+            NaN is a missing sample. None, and only so, with surrogate="log_likelihood": `simulate`
+            then returns log likelihoods [b], or [b, 2] with the sd of their noise; -inf where the
+            data are impossible.
         budget: Simulations in all, failed ones and those found in the bank included; at most 8192,
             earlier ones counted. Or an `Until`, which ends when the posterior is known well
             enough; "auto" is `Until()`.
@@ -196,9 +196,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
     )
     if earlier is not None:
         engine.tell(*earlier)
-    check_reaches(engine, budget, until, batch if in_rounds else 1)
+    _check_reaches_start(engine, budget)
     with ExitStack() as stack:
-        compute = stack.enter_context(open_compute(executor, timeout, batch, bank, identity))
+        compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         bound = "at most" if until else "at least" if confirm else ""
         bar = progress_bar("simulations", budget + confirm, shown=progress, bound=bound)
         advance = stack.enter_context(bar)
@@ -236,6 +236,12 @@ def fit(  # noqa: PLR0913  the one call that most users make
     if warn:
         complain(made.warnings, stacklevel=3)
     return made
+
+
+def _check_reaches_start(engine: Bolfi, budget: int) -> None:
+    due = f"reach the start design of initial={engine.initial} points"
+    cure = "raise budget or lower initial"
+    require(budget + engine.told >= engine.initial, "budget", due, budget, cure=cure)
 
 
 def _check_learnable(engine: Bolfi, runner: Runner) -> None:

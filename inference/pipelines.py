@@ -146,7 +146,7 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
     theta = prior.from_unit(sobol(seed, 0, n, len(prior)))
     seeds = [simulation_seed(seed, i) for i in range(n)]
     with ExitStack() as stack:
-        compute = stack.enter_context(open_compute(executor, timeout, batch, bank, identity))
+        compute = stack.enter_context(open_compute(executor, timeout, batch, bank))
         advance = stack.enter_context(progress_bar("simulations", n, shown=progress))
         asked = jobs(theta, seeds)
         made = run_missing(simulator, asked, compute, identity=identity, advance=advance)

@@ -511,7 +511,9 @@ class Fit(Displayed):
         if tree is not None:
             check_kind("tree", tree, xr.DataTree)
             held = tree["posterior"].attrs if "posterior" in tree.children else {}
-            own = np.isclose(held.get("log_evidence", np.inf), self.evidence.log, equal_nan=True)
+            own = np.array_equal(
+                held.get("log_evidence", np.inf), self.evidence.log, equal_nan=True
+            )
             require(own, "tree", "be what `sample` of this fit has returned", tree)
         return write_report(path, self, self.sample(warn=False) if tree is None else tree)
 

@@ -24,7 +24,7 @@ class Until:
         tolerance: Of the error.
         most: Simulations, those at draws of the posterior not counted.
         error: What shall be below the tolerance, from a fit: None is `Fit.interval_error`; or the
-            expected regret of what is to be decided, in its own units, infinite while unknown.
+            expected regret of what is to be decided, in its own units.
 
     Raises:
         ValueError: a tolerance that is not positive and finite, or bad numbers.
@@ -46,7 +46,7 @@ class Until:
         if self.error is None:
             return made.interval_error() <= self.tolerance and not made.warnings
         try:
-            error = checked_number("it", self.error(made), lambda _: True, "a number")
+            error = float(self.error(made))
         except Exception as failed:  # whatever the user's code raises
             raise ValueError(
                 f"error of Until cannot be used on the fit of {len(made.history.theta)} "
@@ -70,18 +70,6 @@ def checked_budget(budget: object, least: int) -> tuple[int, Until | None]:
     return checked_integer("budget", budget, least, MOST_SIMULATIONS), None
 
 
-def check_reaches(engine: Bolfi, budget: int, until: Until | None, batch: int) -> None:
-    """Raise ValueError for a budget that ends before the start design, or one that may end early
-    before it can."""
-    due = f"reach the start design of initial={engine.initial} points"
-    cure = "raise budget or lower initial"
-    require(budget + engine.told >= engine.initial, "budget", due, budget, cure=cure)
-    least = soonest(engine.initial, batch, engine.told)
-    due = f"exceed {least}, the simulations after which this search may end at the earliest"
-    cure = "give Until(most=...) more, or a number as budget"
-    require(until is None or budget > least, "most of Until", due, budget, cure=cure)
-
-
 def enough(engine: Bolfi, until: Until | None, kept: str) -> Callable[[], bool]:
     """A function that says whether to stop: after the start design it looks at every fifth
     simulation. `kept` says where simulations are."""
@@ -99,16 +87,13 @@ def enough(engine: Bolfi, until: Until | None, kept: str) -> Callable[[], bool]:
     return stop
 
 
-def soonest(start: int, batch: int, told: int = 0) -> int:
+def soonest(start: int, batch: int) -> int:
     """Simulations after which a search that runs in rounds may end at the earliest.
 
     Args:
         start: In the start design.
         batch: Made between two questions whether to stop.
-        told: Earlier ones, which are not counted.
     """
-    made = 0
     for _ in range(IN_A_ROW):
-        made = max(made, -(-(start + EVERY - told) // batch) * batch)
-        start = told + made
-    return made
+        start = -(-(start + EVERY) // batch) * batch
+    return start

@@ -124,7 +124,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         chains: Number of the sampler's chains.
         draws: Number of draws that each chain keeps.
         resume: Whether `out` may hold a run of the same settings, but for a smaller budget or
-            another `until`, to go on with.
+            another `until`, to go on with. A run with `until` has a budget of 60 unless given.
         executor, timeout: Where simulations run: a pool of processes, a Dask client or the address
             of a Dask scheduler, whose workers have one thread each; None is this process. The
             result has the same bits. And seconds that one simulation may take; one that takes

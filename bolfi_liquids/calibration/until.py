@@ -42,7 +42,7 @@ def parts_of(text: str) -> tuple[str, float]:
 
 
 def usual_budget(goal: object) -> int:
-    """Simulations of a search where nobody says how many; with a goal, the most of an `Until`."""
+    """The default budget: that of the settings, or with a goal the most of an `Until`."""
     if goal is None:
         return CalibrationSettings.budget
     from ..inference import Until

@@ -8,7 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import check_function, check_kind, check_runs, checked_integer, checked_number
+from ..arguments import (
+    check_function,
+    check_identity,
+    check_kind,
+    check_runs,
+    checked_integer,
+    checked_number,
+)
 from ..notebook_display import Displayed
 from ..prior import Prior, checked_prior
 from ..simulations.bank import SimulationBank
@@ -260,8 +267,9 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         count += finished
         report(phase, finished, total)
 
-    identities = [one.identity for one in (experiment, *held_out, *proposals)]
-    with open_compute(executor, timeout, batch, bank, *identities) as compute:
+    for one in (experiment, *held_out, *proposals):
+        check_identity(one.identity, "bank", getattr(bank, "path", bank))
+    with open_compute(executor, timeout, batch, bank) as compute:
         study = Study(experiment, prior, extensions, compute, plan or Plan(), seed, counted)
         for one in held_out:
             study.try_elsewhere(one)

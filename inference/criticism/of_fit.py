@@ -20,6 +20,7 @@ def criticise_fit(
     extensions: Extensions,
     *,
     noise: Noise | None = None,
+    identity: str = "",
     windows: Sequence[Window] = (),
     **how: Any,
 ) -> Criticism:
@@ -32,6 +33,7 @@ def criticise_fit(
         noise: Between the simulator and the data; None is what the fit was given or, for a series
             of one channel, estimated. An estimate holds what the simulator misses, and hides some
             of it.
+        identity: Names the simulator in a bank; the fit's, unless given.
         windows: Where to look for disagreement.
         how: Other arguments of `criticise`, such as `held_out`, `bank` or `seed`.
 
@@ -45,7 +47,8 @@ def criticise_fit(
             "the noise between simulator and data is not known; give noise=, such as "
             "criticism.KnownNoise(0.05), or what criticism.rest_noise learns from a stretch at rest"
         )
-    data = Experiment(recipe.simulate, fit.observed, found, recipe.identity, windows=tuple(windows))
+    named = identity or recipe.identity
+    data = Experiment(recipe.simulate, fit.observed, found, named, windows=tuple(windows))
     history, signals = fit.history, fit.history.signals
     if signals.shape[1:] != fit.observed.shape:
         raise ValueError(

@@ -201,7 +201,9 @@ class Evidence(NamedTuple):
     error: float
 
     def __repr__(self) -> str:
-        return f"Evidence(log={self.log:.2f}, error={self.error:.2g})"
+        known = np.isfinite(self.error) and self.error > 0.0
+        places = max(0, 1 - int(np.floor(np.log10(self.error)))) if known else 2
+        return f"Evidence(log={self.log:.{places}f}, error={self.error:.2g})"
 
 
 def evidence_of(

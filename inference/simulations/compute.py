@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from ..arguments import check_identity, check_timeout, checked_integer, require
+from ..arguments import check_timeout, checked_integer, require
 from .bank import SimulationBank
 
 SPAWNING = "give ProcessPoolExecutor(n, mp_context=multiprocessing.get_context('spawn'))"
@@ -68,16 +68,15 @@ def open_compute(
     timeout: float | None = None,
     batch: int | None = None,
     bank: str | Path | SimulationBank | None = None,
-    *identities: str,
+    *,
     one_thread: bool = False,
 ) -> Iterator[Compute]:
     """Check and open what a user gives; what is opened here is closed.
 
     Args:
-        executor: See `open_executor`.
+        executor: See `fit`.
         timeout, batch: See `Compute`.
         bank: A bank, left open, or the path of one.
-        identities: Names in the bank of simulators, each of which needs one.
         one_thread: Whether the simulator serves only one thread of a process.
 
     Raises:
@@ -87,8 +86,6 @@ def open_compute(
     checked = Compute(None, timeout, batch)
     usable = bank is None or isinstance(bank, PathLike | SimulationBank | str) and bank != ""
     require(usable, "bank", "be the path of a file or a SimulationBank", bank)
-    for identity in identities:
-        check_identity(identity, "bank", bank)
     with ExitStack() as stack:
         if bank is not None and not isinstance(bank, SimulationBank):
             bank = stack.enter_context(SimulationBank(bank))

@@ -8,6 +8,7 @@ from functools import partial
 from itertools import batched
 from typing import NamedTuple
 
+from ..arguments import check_identity
 from ..types import Simulator
 from .bank import Simulation, SimulationBank
 from .compute import Compute, is_pool, killed_its_worker
@@ -58,8 +59,11 @@ class Runner:
         shape: tuple[int, ...] | None = None,
         identity: str = "",
     ):
+        if compute.bank is not None:
+            check_identity(identity, "bank", compute.bank.path)
         self.simulate, self.shape = simulate, shape
         self._results = self._unusable = 0
+        self._checked = False
         self.seconds = 0.0
         self._resources = ExitStack()
         own = SimulationBank() if compute.bank is None else nullcontext(compute.bank)
@@ -70,7 +74,8 @@ class Runner:
         self._submitted: set[Future[list[Simulation]]] = set()
 
     def how_called(self, errors: Iterable[str]) -> str:
-        """How a user's function is called, as the end of a message, if it always misread that."""
+        """How a user's function is called, as the end of a message, where every error suggests a
+        wrong call."""
         misread = all(error.startswith(("TypeError", "IndexError")) for error in errors)
         return CALLED.get(type(self.simulate), "") if misread else ""
 
@@ -181,8 +186,9 @@ class Runner:
     def _simulate(self, orders: Sequence[Order]) -> None:
         """Make the runs in one call, here or on the executor."""
         here = self.executor is None or is_pool(self.executor)
-        if here and isinstance(self.simulate, OneByOne):
+        if here and not self._checked and isinstance(self.simulate, OneByOne):
             self.simulate._check_here()
+            self._checked = True
         batch = [order.job for order in orders]
         work = partial(run_batch, self.simulate, batch, self.shape, self.timeout)
         if self.executor is None:
@@ -276,7 +282,7 @@ def run_missing(
     identity: str = "",
     advance: Callable[[int], object] = lambda count: None,
 ) -> list[Simulation]:
-    """Results of all jobs, in order; those that the bank lacks are simulated, see `Runner`.
+    """Results of all jobs, in order; those that the bank lacks are simulated.
 
     Args:
         simulate: The user's simulator.

@@ -11,7 +11,7 @@ from .measurement_noise import Layout
 
 MIN_SERIES = 5  # samples from which an output counts as a series, whose values share a scale
 MIN_LONG = 16  # samples of a series from which their residual tells the size of the noise
-LEAST_UNIT = 1e-100  # smaller numbers have no square
+MIN_UNIT = 1e-100  # smaller numbers have no square
 MAX_VALUES = 2000  # values; neighbouring samples of longer series are averaged
 
 Summary = Callable[[np.ndarray], np.ndarray]
@@ -95,7 +95,7 @@ class Output:
             variance = mean[channel]
         # a constant simulator has no other unit than its output, if that has a square
         size = np.abs(values).max()
-        unit = size if size > LEAST_UNIT and not variance.any() else 1.0
+        unit = size if size > MIN_UNIT and not variance.any() else 1.0
         return np.where(variance > 0, np.sqrt(variance), unit)
 
 
@@ -122,7 +122,7 @@ def describe(observed: np.ndarray, summary: Summary | None) -> Output:
     """The map from outputs like `observed` to values; NaN is a missing sample.
 
     Raises:
-        ValueError: nothing is finite, or the summary fails, or is not where samples are.
+        ValueError: nothing is finite, something is infinite, or the summary fails.
     """
     try:
         summarised = summarise(summary, observed)
@@ -132,16 +132,14 @@ def describe(observed: np.ndarray, summary: Summary | None) -> Output:
             "called with one output, not with a batch of them"
         ) from error
     finite = np.isfinite(summarised)
-    # value by value, it leaves a missing sample missing
-    missing = np.isnan(observed) if summarised.shape == observed.shape else False
-    if bad := np.flatnonzero(~finite & ~(np.isnan(summarised) & missing)).tolist():
+    if np.isinf(summarised).any():
         raise ValueError(
-            f"summary must return finite values, got {infinities(summarised)} of observed, at "
-            f"{bad!r:.60}, from {np.isnan(observed).sum()} missing samples; leave them out, or "
-            "choose another summary, such as np.nanmean, or np.log1p for np.log of zeros"
+            f"summary must not return infinite values, got {infinities(summarised)} of observed; "
+            "leave them out, or choose another summary, such as np.log1p for np.log of zeros"
         )
     if not finite.any():
-        raise ValueError("observed must have a finite value, got none")
+        named = "observed" if summary is None else "the summary of observed"
+        raise ValueError(f"{named} must have a finite value, got none")
     filled = finite.reshape(len(finite), -1).any(1).sum()
     series = summary is None and filled >= MIN_SERIES
     # channel after channel, time inside

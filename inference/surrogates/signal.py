@@ -183,12 +183,15 @@ class SignalSurrogate(OfProcesses):
         return given, self.scale.in_units(best, misfit[None])[0, 0]
 
     def described(self) -> list[str]:
-        """The noise, and how it was found."""
+        """The noise, how it was found, and what of a summary is not compared."""
         given, found = self._noise_sds
+        missing = int(np.prod(self.output.shape)) - len(self.output.present)
+        lost = [f"{missing} values of the summary of observed missing"] if missing else []
+        lost = lost if self.output.summary is not None else []
         if self.known is None:
-            return [f"measurement noise of sd {found:.3g} in the first value, estimated"]
+            return [f"measurement noise of sd {found:.3g} in the first value, estimated", *lost]
         misfit = f", and a misfit of sd {found:.3g}" if self._missed() else ""
-        return [f"measurement noise of sd {given:.3g} in the first value, given{misfit}"]
+        return [f"measurement noise of sd {given:.3g} in the first value, given{misfit}", *lost]
 
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new simulated output's values at u [n, d]: [n, m], [n, m].

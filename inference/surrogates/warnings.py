@@ -201,13 +201,13 @@ def history_warnings(history: History) -> list[str]:
 
 
 def shape_warnings(history: History) -> list[str]:
-    """A warning if a summary is taken of data of another shape than all simulations have."""
-    shapes, seen = {one.shape for one in history.outputs if one is not None}, history.observed_shape
+    """A warning if a summary is taken of data that have a summary's shape, not a simulation's."""
+    seen, simulated = history.observed_shape, history.signal_shape
     said = (
-        f"observed has the shape {seen}, simulations {history.signal_shape}: observed is to be the "
-        "raw output, of which the summary is taken as of each simulation's"
+        f"observed has the shape {seen} of a summary, simulations {simulated}: observed is to be "
+        "the raw output, of which the summary is taken as of each simulation's"
     )
-    return [said] if len(shapes) == 1 and seen not in shapes else []  # lengths may be random
+    return [said] if seen == history.features.shape[1:] != simulated else []
 
 
 def unconfirmed_warnings(history: History, runs: np.ndarray) -> list[str]:

@@ -10,6 +10,7 @@ OWN = (OURS, "discrepancy")
 TIE = 0.01  # differences of TV below it
 TOLD = ("vbmc", "vbmc_noisy")  # the likelihood
 STALLED = 0.1  # share of TV that the last rise of N takes off, where it helps; TV that needs none
+USELESS = 0.9  # TV from which a posterior tells next to nothing
 HIGH = 0.5  # TV at which a posterior is of little use
 COVERED = 0.8  # of 90 % intervals, at least
 
@@ -25,6 +26,7 @@ def summary(rows: list[dict]) -> list[str]:
     told = {cell for e, cell in scored if e in TOLD} & ours.keys()
     lost = losses(blind, met)
     beaten = losses({k: value for k, value in scored.items() if k[0] in (OURS, *TOLD)}, told)
+    useless = sum(ours[cell] > USELESS for cell in met - lost.keys())
     runs = {task: [ours[c] for c in cells if c[0] == task and c in ours] for task, _ in cells}
     stalled = {
         task: values[-1]
@@ -41,9 +43,10 @@ def summary(rows: list[dict]) -> list[str]:
         )
 
     return [
-        f"- **Lowest TV**, among engines that are not told the likelihood: in "
-        f"{len(met) - len(lost)} of {len(met)} cells that a peer shares. `{OURS}` loses (its TV; "
-        f"the other's): {against(lost)}.",
+        f"- **Lowest TV**, or tied, among engines that are not told the likelihood: in "
+        f"{len(met) - len(lost)} of {len(met)} cells that a peer shares, {useless} of them above "
+        f"{USELESS}, where nobody knows much. `{OURS}` loses (its TV; the other's): "
+        f"{against(lost)}.",
         f"- **PyVBMC is told the likelihood** and wins {len(beaten)} of {len(told)} cells: "
         f"{against(beaten)}.",
         f"- **More runs stop helping** on {valued(stalled)}: the last rise of N took off less than "

@@ -180,15 +180,13 @@ def test_outputs_of_any_size_are_learned_from_or_told(prior, observed, simulate,
     ("simulate", "vectorised", "told"),
     [
         (lambda theta, seeds: float(theta["slope"]) * np.ones(30), True, "vectorised=False"),
-        (lambda theta, seed: theta["slope"][:, None] * np.ones(30), False, "name -> float"),
+        (lambda theta, seed: theta["slope"][:, None] * np.ones(30), False, "theta, name -> float"),
     ],
 )
 def test_a_simulator_that_misreads_its_call_is_told_the_call(
     prior, observed, simulate, vectorised, told
 ):
-    with pytest.raises(
-        RuntimeError, match=f"TypeError.* simulate is called with .*{told}|TypeError.*{told}"
-    ):
+    with pytest.raises(RuntimeError, match=f"TypeError.* simulate is called with .*{told}"):
         inference.fit(simulate, prior, observed, vectorised=vectorised)
 
 

@@ -193,9 +193,12 @@ with inference.SimulationBank(sys.argv[1]) as bank, ThreadPoolExecutor(3) as poo
     if sys.argv[4] == "alone":
         made = []
         for first in range(0, 40, 4):
-            made += run_missing(simulate, jobs[first : first + 4], Compute(bank=bank))
+            some = jobs[first : first + 4]
+            made += run_missing(simulate, some, Compute(bank=bank), identity="own")
     else:
-        made = run_missing(simulate, jobs, Compute(bank=bank, executor=pool), (1,))
+        made = run_missing(
+            simulate, jobs, Compute(bank=bank, executor=pool), (1,), identity="own"
+        )
 assert [m.signal[0] for m in made] == [job.seed + 0.5 for job in jobs]
 """
 
