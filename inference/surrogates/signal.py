@@ -186,8 +186,8 @@ class SignalSurrogate(OfProcesses):
         """The noise, how it was found, and what of a summary is not compared."""
         given, found = self._noise_sds
         missing = int(np.prod(self.output.shape)) - len(self.output.present)
-        lost = [f"{missing} values of the summary of observed missing"] if missing else []
-        lost = lost if self.output.summary is not None else []
+        said = missing and self.output.summary is not None
+        lost = [f"{missing} values of the summary of observed missing"] if said else []
         if self.known is None:
             return [f"measurement noise of sd {found:.3g} in the first value, estimated", *lost]
         misfit = f", and a misfit of sd {found:.3g}" if self._missed() else ""

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEVEL = 0.05  # of all tests against a peer together
-ABOUT = {  # beside the tasks: what is told of them makes no result stale
+ABOUT = {  # kept apart from the tasks: a change in their files would make all results stale
     "gauss2": ("mean of 20 draws of two correlated normals", "ours"),
     "ma2": ("moving average of order 2, in 100 steps", "ours"),
     "pend2": ("drags of a driven pendulum with process noise", "ours"),
